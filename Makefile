@@ -1,0 +1,56 @@
+# Set-up happens by itself: a virtual environment in .venv with the package built into it.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format bench clean prerequisites
+
+help: ## This list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
+
+demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
+	@mkdir -p out
+	@$(BIN)/graspmoduli grasp examples/objects/yogurt_bottle.ply \
+	    --json out/yogurt_bottle.json --picture out/yogurt_bottle.png
+
+test: $(READY) ## Every test, Rust and Python
+	cargo test --release --quiet --package graspmoduli
+	$(BIN)/pytest --numprocesses auto python tests
+
+lint: $(READY) ## Formatting, clippy, ruff and types
+	cargo fmt --check
+	cargo clippy --release --all-targets --quiet -- --deny warnings
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+
+format: $(READY) ## Format the sources
+	cargo fmt
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(READY) ## Speed, side by side with SciPy in one run
+	$(BIN)/python benchmarks/bench.py --markdown docs/benchmarks.md
+
+clean: ## Remove what was built
+	rm -rf $(VENV) target out
+
+# The virtual environment is made anew by hand only: make clean.
+$(READY): $(SOURCES) | prerequisites
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
+	    { echo "graspmoduli needs Python's venv module: install it (Debian: apt install python3-venv)"; exit 1; }
+	@echo "building and installing into $(VENV) (about a minute the first time)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $(READY)
+
+prerequisites:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || \
+	    { echo "graspmoduli needs Python 3.10 or newer: install it from python.org, or name one with make PYTHON=..."; exit 1; }
+	@command -v cargo >/dev/null || \
+	    { echo "graspmoduli needs Rust to build: install it from https://rustup.rs"; exit 1; }
+	@command -v cc >/dev/null || \
+	    { echo "graspmoduli needs a C linker to build: install one (Debian: apt install gcc)"; exit 1; }

@@ -1,0 +1,325 @@
+//! Python binding: borrow, release the interpreter, call, map the error. Arguments come checked
+//! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
+
+use graspmoduli::ascent::{Anywhere, Cells, Region};
+use graspmoduli::contact::{Contact, FrictionCone};
+use graspmoduli::error::Error;
+use graspmoduli::quality::{Batch, Gradient};
+use graspmoduli::search;
+use graspmoduli::synthesis;
+use graspmoduli::{sampling, surface};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::prelude::*;
+use std::ops::ControlFlow;
+
+pyo3::create_exception!(
+    graspmoduli,
+    GraspModuliError,
+    PyValueError,
+    "Wrong input: names the argument, what was wanted and what came."
+);
+
+fn raise(error: Error) -> PyErr {
+    GraspModuliError::new_err(error.to_string())
+}
+
+fn vectors(values: &[f64]) -> &[[f64; 3]] {
+    values.as_chunks().0
+}
+
+fn batch<'a>(
+    contacts: &'a PyReadonlyArray3<'_, f64>,
+    normals: &'a PyReadonlyArray3<'_, f64>,
+    center_of_mass: &'a PyReadonlyArray2<'_, f64>,
+) -> PyResult<Batch<'a>> {
+    Ok(Batch {
+        points: vectors(contacts.as_slice()?),
+        normals: vectors(normals.as_slice()?),
+        centers: vectors(center_of_mass.as_slice()?),
+    })
+}
+
+/// Exact Q_l of n grasps.
+#[pyfunction]
+fn quality<'py>(
+    py: Python<'py>,
+    contacts: PyReadonlyArray3<'py, f64>,
+    normals: PyReadonlyArray3<'py, f64>,
+    center_of_mass: PyReadonlyArray2<'py, f64>,
+    friction: f64,
+    edges: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let batch = batch(&contacts, &normals, &center_of_mass)?;
+    let mut out = vec![0.0; batch.centers.len()];
+    py.detach(|| batch.quality(&cone, &mut out))
+        .map_err(raise)?;
+    Ok(PyArray1::from_vec(py, out))
+}
+
+/// Exact Q_l of n grasps and its gradient: per row value, contacts, normals, centre of mass.
+#[pyfunction]
+fn quality_gradient<'py>(
+    py: Python<'py>,
+    contacts: PyReadonlyArray3<'py, f64>,
+    normals: PyReadonlyArray3<'py, f64>,
+    center_of_mass: PyReadonlyArray2<'py, f64>,
+    friction: f64,
+    edges: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let batch = batch(&contacts, &normals, &center_of_mass)?;
+    let mut out = vec![Gradient::ZERO; batch.centers.len()];
+    py.detach(|| batch.gradient(&cone, &mut out))
+        .map_err(raise)?;
+    table(py, out.iter().map(flat).collect())
+}
+
+fn flat(gradient: &Gradient) -> [f64; 22] {
+    let mut row = [0.0; 22];
+    row[0] = gradient.value;
+    let vectors = gradient.contacts.iter().chain(&gradient.normals);
+    for (slot, vector) in row[1..]
+        .chunks_exact_mut(3)
+        .zip(vectors.chain([&gradient.center_of_mass]))
+    {
+        slot.copy_from_slice(&vector.to_array());
+    }
+    row
+}
+
+/// Rows of equal length as an array.
+fn table<'py, const N: usize>(
+    py: Python<'py>,
+    rows: Vec<[f64; N]>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let count = rows.len();
+    PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
+}
+
+/// A surface with cylindrical coordinates.
+#[pyclass(frozen)]
+struct Surface(surface::Surface);
+
+#[pymethods]
+impl Surface {
+    #[new]
+    fn new(bottom: f64, top: f64, coefficients: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
+        let columns = coefficients.as_array().ncols();
+        let values = coefficients.as_slice()?.to_vec();
+        let surface = surface::Surface::new(bottom, top, columns, values).map_err(raise)?;
+        Ok(Self(surface))
+    }
+
+    #[getter]
+    fn bottom(&self) -> f64 {
+        self.0.bottom()
+    }
+
+    #[getter]
+    fn top(&self) -> f64 {
+        self.0.top()
+    }
+
+    #[getter]
+    fn coefficients<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (rows, columns) = self.0.shape();
+        PyArray1::from_slice(py, self.0.coefficients()).reshape([rows, columns])
+    }
+
+    /// Per (u, θ): f, f_u, f_θ, f_uu, f_uθ, f_θθ.
+    fn radius<'py>(
+        &self,
+        py: Python<'py>,
+        u: PyReadonlyArray1<'py, f64>,
+        theta: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = u.as_slice()?.iter().zip(theta.as_slice()?);
+        let rows = points.map(|(&u, &theta)| {
+            let r = self.0.radius(u, theta);
+            [
+                r.value, r.slope[0], r.slope[1], r.bend[0], r.bend[1], r.bend[2],
+            ]
+        });
+        table(py, rows.collect())
+    }
+
+    /// Per (u, θ): point, normal, t₁, t₂, n_u, n_θ, c_uu, c_uθ, c_θθ.
+    fn place<'py>(
+        &self,
+        py: Python<'py>,
+        u: PyReadonlyArray1<'py, f64>,
+        theta: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = u.as_slice()?.iter().zip(theta.as_slice()?);
+        let rows = points.map(|(&u, &theta)| {
+            let placed = self.0.place(u, theta);
+            let [t1, t2] = placed.tangents;
+            let [n1, n2] = placed.normal_slopes;
+            let [uu, ut, tt] = self.0.second_derivatives(u, theta);
+            let contact = placed.contact;
+            let mut row = [0.0; 27];
+            let vectors = [contact.point, contact.normal, t1, t2, n1, n2, uu, ut, tt];
+            for (slot, vector) in row.chunks_exact_mut(3).zip(vectors) {
+                slot.copy_from_slice(&vector.to_array());
+            }
+            row
+        });
+        table(py, rows.collect())
+    }
+
+    /// Area, centre of mass, volume, centre of mass of the solid; by Simpson's rule if `steps`.
+    #[pyo3(signature = (steps=None))]
+    fn integrals(&self, py: Python<'_>, steps: Option<usize>) -> (f64, [f64; 3], f64, [f64; 3]) {
+        let integrals = py.detach(|| match steps {
+            Some(steps) => self.0.integrals_by_simpson(steps),
+            None => *self.0.integrals(),
+        });
+        (
+            integrals.area,
+            integrals.center_of_mass.to_array(),
+            integrals.volume,
+            integrals.solid_center_of_mass.to_array(),
+        )
+    }
+
+    fn radius_about(&self, center: [f64; 3]) -> f64 {
+        self.0.radius_about(center.into(), 64)
+    }
+
+    fn project(&self) -> Self {
+        Self(self.0.project())
+    }
+}
+
+/// Σ weight·surface in the convex cone.
+#[pyfunction]
+fn combine(py: Python<'_>, weights: Vec<f64>, surfaces: Vec<Py<Surface>>) -> PyResult<Surface> {
+    let surfaces: Vec<_> = surfaces.iter().map(|surface| &surface.get().0).collect();
+    let terms: Vec<_> = weights.into_iter().zip(surfaces).collect();
+    py.detach(|| surface::Surface::combine(&terms))
+        .map(Surface)
+        .map_err(raise)
+}
+
+/// Maps points of the unit square to (u, θ), equal areas to equal areas.
+#[pyfunction]
+fn sample_points<'py>(
+    py: Python<'py>,
+    surface: &Surface,
+    square: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let square = square.as_slice()?.as_chunks().0;
+    let points = py.detach(|| sampling::by_area(&surface.0, square));
+    table(py, points)
+}
+
+/// The best of all triples of n contacts: indices and qualities. `progress` is called with the
+/// numbers of triples done and in all.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+fn best_triples<'py>(
+    py: Python<'py>,
+    contacts: PyReadonlyArray2<'py, f64>,
+    normals: PyReadonlyArray2<'py, f64>,
+    center_of_mass: [f64; 3],
+    friction: f64,
+    edges: usize,
+    top: usize,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<([usize; 3], f64)>> {
+    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let contacts: Vec<Contact> = vectors(contacts.as_slice()?)
+        .iter()
+        .zip(vectors(normals.as_slice()?))
+        .map(|(&point, &normal)| Contact {
+            point: point.into(),
+            normal: normal.into(),
+        })
+        .collect();
+    let mut failure = None;
+    let result = py.detach(|| {
+        let report = |done, total| {
+            let outcome = Python::attach(|py| {
+                py.check_signals()?;
+                progress
+                    .as_ref()
+                    .map_or(Ok(()), |call| call.call1(py, (done, total)).map(drop))
+            });
+            match outcome {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(error) => {
+                    failure = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        };
+        let center = center_of_mass.into();
+        search::best_triples(&contacts, center, &cone, top, threads, report)
+    });
+    match (result, failure) {
+        (Ok(ranked), _) => Ok(ranked.into_iter().map(|r| (r.indices, r.quality)).collect()),
+        (Err(_), Some(error)) => Err(error),
+        (Err(Error::Interrupted), None) => Err(PyKeyboardInterrupt::new_err(())),
+        (Err(error), None) => Err(raise(error)),
+    }
+}
+
+/// Synthesized grasps, best first: per row u₁, θ₁, u₂, θ₂, u₃, θ₃, quality.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+fn synthesize<'py>(
+    py: Python<'py>,
+    surface: &Surface,
+    center_of_mass: [f64; 3],
+    friction: f64,
+    edges: usize,
+    top: usize,
+    starts: usize,
+    square: PyReadonlyArray2<'py, f64>,
+    allowed: Option<PyReadonlyArray2<'py, bool>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let square = square.as_slice()?.as_chunks().0;
+    let cells = match &allowed {
+        Some(cells) => Some(Cells {
+            allowed: cells.as_slice()?,
+            columns: cells.as_array().ncols(),
+        }),
+        None => None,
+    };
+    let found = py.detach(|| {
+        let region: &dyn Region = match &cells {
+            Some(cells) => cells,
+            None => &Anywhere,
+        };
+        synthesis::synthesize(
+            &surface.0,
+            center_of_mass.into(),
+            &cone,
+            region,
+            top,
+            starts,
+            square,
+        )
+    });
+    let rows = found.map_err(raise)?.into_iter().map(|grasp| {
+        let [[u1, t1], [u2, t2], [u3, t3]] = grasp.coordinates;
+        [u1, t1, u2, t2, u3, t3, grasp.quality]
+    });
+    table(py, rows.collect())
+}
+
+/// The compiled kernels of graspmoduli.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::{
+        GraspModuliError, Surface, best_triples, combine, quality, quality_gradient, sample_points,
+        synthesize,
+    };
+}

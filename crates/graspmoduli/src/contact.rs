@@ -1,0 +1,220 @@
+//! Contact frames and friction cones (Sec. II of the paper).
+
+use crate::error::Error;
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// A contact as the kernels see it: a point and the unit normal pointing into the object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Contact point in the object frame.
+    pub point: DVec3,
+    /// Unit normal pointing into the object.
+    pub normal: DVec3,
+}
+
+/// The polygonal friction cone about e₃, and its polar cone: what every contact rotates.
+///
+/// Edge j is f_j = (μ cos φ_j, μ sin φ_j, 1) with φ_j = 2πj/l. The polar cone has the l extreme
+/// rays (cos ψ_j, sin ψ_j, −μ cos(π/l)), ψ_j = 2π(j + ½)/l; ray j is orthogonal to the edges
+/// j and j + 1.
+#[derive(Debug, Clone)]
+pub struct FrictionCone {
+    friction: f64,
+    /// (cos φ_j, sin φ_j), already multiplied by μ.
+    pub(crate) edges: Vec<[f64; 2]>,
+    /// (cos ψ_j, sin ψ_j).
+    pub(crate) rays: Vec<[f64; 2]>,
+    /// Component of every ray along the normal: −μ cos(π/l).
+    pub(crate) ray_height: f64,
+}
+
+impl FrictionCone {
+    /// The cone of friction coefficient μ = `friction` with l = `edges` edges.
+    pub fn new(friction: f64, edges: usize) -> Result<Self, Error> {
+        if !(friction.is_finite() && friction > 0.0) {
+            return Err(Error::Friction(friction));
+        }
+        if edges < 3 {
+            return Err(Error::Edges(edges));
+        }
+        let at = |turns: f64| {
+            let (sin, cos) = (TAU * turns / edges as f64).sin_cos();
+            [cos, sin]
+        };
+        // The paper counts j = 1…l; j = 0 and j = l are the same edge, so the set is the same.
+        Ok(Self {
+            friction,
+            edges: (0..edges)
+                .map(|j| at(j as f64).map(|x| friction * x))
+                .collect(),
+            rays: (0..edges).map(|j| at(j as f64 + 0.5)).collect(),
+            ray_height: -friction * (TAU / (2.0 * edges as f64)).cos(),
+        })
+    }
+
+    /// Friction coefficient μ.
+    pub fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    /// Number of edges l.
+    pub fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Never: a cone has at least three edges.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Edge j of the cone about the normal of `frame`.
+    pub fn edge(&self, frame: &Frame, j: usize) -> DVec3 {
+        let [x, y] = self.edges[j];
+        frame.tangents[0] * x + frame.tangents[1] * y + frame.normal
+    }
+}
+
+/// R(n): the smallest rotation that takes e₃ to n, as the images of e₁, e₂, e₃.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// R(n) e₁ and R(n) e₂.
+    pub tangents: [DVec3; 2],
+    /// R(n) e₃ = n.
+    pub normal: DVec3,
+    /// 1 / (1 + n₃), the one number of the rotation that is not polynomial in n.
+    k: f64,
+}
+
+impl Frame {
+    /// The contact frame of a unit normal.
+    #[inline(always)]
+    pub fn new(normal: DVec3) -> Self {
+        let DVec3 { x, y, z } = normal;
+        // 1 + z cancels near −e₃; there 1 + z = (x² + y²)/(1 − z) is exact to rounding.
+        let planar = x * x + y * y;
+        let k = if z > 0.0 {
+            1.0 / (1.0 + z)
+        } else {
+            (1.0 - z) / planar
+        };
+        if planar < f64::MIN_POSITIVE && z < 0.0 {
+            return Self {
+                tangents: [DVec3::X, DVec3::NEG_Y],
+                normal,
+                k: 0.0,
+            };
+        }
+        Self {
+            tangents: [
+                DVec3::new(1.0 - k * x * x, -k * x * y, -x),
+                DVec3::new(-k * x * y, 1.0 - k * y * y, -y),
+            ],
+            normal,
+            k,
+        }
+    }
+
+    /// Gradient with respect to n, tangent to the sphere, of ⟨p, R(n) (a, b, c)⟩.
+    ///
+    /// At n = −e₃, where R is not continuous, the motion of the tangents is left out.
+    pub fn gradient(&self, p: DVec3, [a, b, c]: [f64; 3]) -> DVec3 {
+        let DVec3 { x, y, .. } = self.normal;
+        let k = self.k;
+        // ⟨p, t₁⟩ and ⟨p, t₂⟩ as polynomials in (x, y, k), with dk = −k² dz.
+        let first = DVec3::new(
+            -2.0 * k * x * p.x - k * y * p.y - p.z,
+            -k * x * p.y,
+            k * k * x * (x * p.x + y * p.y),
+        );
+        let second = DVec3::new(
+            -k * y * p.x,
+            -k * x * p.x - 2.0 * k * y * p.y - p.z,
+            k * k * y * (x * p.x + y * p.y),
+        );
+        let free = first * a + second * b + p * c;
+        free - self.normal * free.dot(self.normal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn normals() -> Vec<DVec3> {
+        let mut all = vec![DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_Z, DVec3::NEG_X];
+        for (x, y) in [(1e-3, 2e-3), (1e-8, -1e-8), (1e-160, 0.0), (0.6, -0.3)] {
+            all.push(DVec3::new(x, y, -1.0).normalize());
+            all.push(DVec3::new(x, y, 1.0).normalize());
+        }
+        all
+    }
+
+    #[test]
+    fn frames_are_rotations_that_take_e3_to_the_normal() {
+        for n in normals() {
+            let Frame {
+                tangents: [t1, t2],
+                normal,
+                ..
+            } = Frame::new(n);
+            assert!((t1.cross(t2) - n).length() < 1e-14, "{n}");
+            assert!((t1.length() - 1.0).abs() < 1e-14 && (t2.length() - 1.0).abs() < 1e-14);
+            assert_eq!(normal, n);
+        }
+    }
+
+    #[test]
+    fn the_rotation_is_the_smallest() {
+        // The axis e₃ × n is fixed by it.
+        let n = DVec3::new(0.3, -0.5, -0.4).normalize();
+        let axis = DVec3::Z.cross(n).normalize();
+        let frame = Frame::new(n);
+        let turned = frame.tangents[0] * axis.x + frame.tangents[1] * axis.y + n * axis.z;
+        assert!((turned - axis).length() < 1e-15);
+    }
+
+    #[test]
+    fn rays_are_orthogonal_to_their_two_edges_and_polar_to_the_others() {
+        for l in [3, 4, 8, 13] {
+            let cone = FrictionCone::new(0.7, l).unwrap();
+            for (j, ray) in cone.rays.iter().enumerate() {
+                for (i, edge) in cone.edges.iter().enumerate() {
+                    let product = ray[0] * edge[0] + ray[1] * edge[1] + cone.ray_height;
+                    if i == j || i == (j + 1) % l {
+                        assert!(product.abs() < 1e-15);
+                    } else {
+                        assert!(product < -1e-3);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_gradient_of_the_frame_is_that_of_finite_differences() {
+        let p = DVec3::new(0.3, -1.1, 0.7);
+        let weights = [0.4, -0.2, 1.3];
+        let value = |n: DVec3| {
+            let frame = Frame::new(n.normalize());
+            p.dot(
+                frame.tangents[0] * weights[0]
+                    + frame.tangents[1] * weights[1]
+                    + frame.normal * weights[2],
+            )
+        };
+        for n in [
+            DVec3::new(0.3, 0.2, 0.9),
+            DVec3::new(-0.4, 0.1, -0.95),
+            DVec3::X,
+        ] {
+            let n = n.normalize();
+            let gradient = Frame::new(n).gradient(p, weights);
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let h = 1e-6;
+                let difference = (value(n + axis * h) - value(n - axis * h)) / (2.0 * h);
+                assert!((difference - gradient.dot(axis)).abs() < 1e-8);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! What can be wrong with a request, as data; the message is made from it.
+
+use std::fmt;
+
+/// Misuse of the library. A grasp that is not force closure is *not* an error: its quality is 0.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Error {
+    /// The friction coefficient is not a positive finite number.
+    Friction(f64),
+    /// Fewer than three friction-cone edges.
+    Edges(usize),
+    /// Only up to three contacts are supported so far.
+    Contacts(usize),
+    /// A surface needs at least four coefficients along its height and four around it.
+    CoefficientShape(usize, usize),
+    /// The heights do not satisfy bottom < top.
+    Heights(f64, f64),
+    /// A spline coefficient is not positive and finite: row (height), column (angle), value.
+    Coefficient(usize, usize, f64),
+    /// The coefficients do not fill the stated shape: wanted, got.
+    CoefficientCount(usize, usize),
+    /// The common refinement of two spline grids would be too large: rows, columns.
+    GridTooLarge(usize, usize),
+    /// A convex-cone operation with a factor that is not positive and finite.
+    Weight(f64),
+    /// The caller asked to stop.
+    Interrupted,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Error::Friction(got) => {
+                write!(out, "friction must be a positive finite number, got {got}")
+            }
+            Error::Edges(got) => write!(out, "edges must be at least 3, got {got}"),
+            Error::Contacts(got) => write!(
+                out,
+                "contacts must be at most 3 per grasp in this version, got {got}"
+            ),
+            Error::CoefficientShape(rows, columns) => write!(
+                out,
+                "coefficients must have shape (at least 4, at least 4), got ({rows}, {columns})"
+            ),
+            Error::Heights(bottom, top) => write!(
+                out,
+                "bottom must be below top, both finite, got bottom {bottom} and top {top}"
+            ),
+            Error::Coefficient(row, column, value) => write!(
+                out,
+                "coefficients must be positive and finite so that the radius is positive, \
+                 got {value} at ({row}, {column})"
+            ),
+            Error::CoefficientCount(wanted, got) => {
+                write!(out, "coefficients must have {wanted} entries, got {got}")
+            }
+            Error::GridTooLarge(rows, columns) => write!(
+                out,
+                "surfaces must have spline grids with a small common refinement, \
+                 got one of {rows} by {columns}"
+            ),
+            Error::Weight(got) => {
+                write!(out, "weights must be positive finite numbers, got {got}")
+            }
+            Error::Interrupted => write!(out, "interrupted"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

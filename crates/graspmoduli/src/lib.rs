@@ -1,0 +1,38 @@
+//! Exact grasp quality, and grasps on families of shapes.
+//!
+//! Fingers touch an object at points $c_i$ with unit normals $n_i$ that point inward; $z$ is the
+//! centre of mass. By Coulomb's law a finger can apply any force in a cone about $n_i$, here
+//! a polygonal one with edges $f_{ij}$, $\langle f_{ij}, n_i\rangle = 1$. The *grasp quality*
+//! $$Q_l = \operatorname{dist}(0, \partial S) \text{ if } 0 \in \operatorname{int} S
+//!   \text{, else } 0, \qquad
+//!   S = \operatorname{conv}\{(f_{ij}, (c_i - z) \times f_{ij})\} \subset \mathbb{R}^6$$
+//! is the largest disturbance, in any direction, that fingers pressing with total normal force 1
+//! resist. Objects are surfaces in cylindrical coordinates
+//! $$S_{f,a,b} = \{(f(u,\theta)\cos\theta, f(u,\theta)\sin\theta, (1-u)a + ub)\},$$
+//! which form a convex cone, so that shapes and the grasps on them deform continuously.
+//!
+//! The mathematics is that of F. T. Pokorny, K. Hang, D. Kragic, *Grasp Moduli Spaces*, RSS 2013.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`contact`] | contact frames, friction cones |
+//! | [`quality`] | exact $Q_l$ and its gradient |
+//! | [`surface`] | spline surfaces: points, normals, integrals, convex-cone operations |
+//! | [`sampling`] | area-uniform points |
+//! | [`search`] | the best of all triples of contacts |
+//! | [`ascent`] | ascent of $Q_l$ on a surface |
+//! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
+//! | [`error`] | what can be wrong with a request |
+//!
+//! No global state: threads and random numbers are arguments.
+
+pub mod ascent;
+pub mod contact;
+pub mod error;
+mod nnls;
+pub mod quality;
+pub mod sampling;
+pub mod search;
+mod spline;
+pub mod surface;
+pub mod synthesis;

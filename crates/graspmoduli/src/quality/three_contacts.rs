@@ -1,0 +1,265 @@
+//! Exact Q_l of three contacts in closed form.
+//!
+//! Let P = {x ∈ R⁶ : ⟨x, w_ij⟩ ≤ 1} be the polar of the wrench hull. If 0 is interior to the
+//! hull, Q_l = 1 / max{‖x‖ : x ∈ P}: the longest admissible twist x = (v, ω), v the velocity of
+//! the centre of mass. The condition on contact i is that its velocity
+//! y_i = v + ω × r_i lies in n_i + C_i°, with C_i° the polar of friction cone i, spanned by rays.
+//! Six constraints are active at a vertex of P, counted as 3 for the apex of a cone, 2 for a ray,
+//! 1 for a face; generically that is ray–ray–ray or apex–ray–face. Every candidate of either kind
+//! is a 3×3 system, and a vertex exactly when its three multipliers are not negative.
+//!
+//! The loops below only propose twists; [`Kernel::offer`] divides each by its support h(x) = max
+//! ⟨x, w_ij⟩, which puts it on the boundary of P whatever rounding did. So every value found is
+//! an upper bound of Q_l, and degenerate candidates (0/0) can do no harm.
+
+use super::Twist;
+use super::lanes::dot;
+use super::plane::{LANES, Lanes, Plane};
+use crate::contact::{Contact, FrictionCone};
+use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::ControlFlow;
+
+/// Multipliers above minus this count as not negative: they are products of unit vectors.
+pub(super) const SLACK: f64 = 1e-13;
+/// Added to the squared determinant of a system: candidates with a determinant below 1e-14 are
+/// rounding noise unless their twist is huge all the same.
+pub(super) const TINY: f64 = 1e-28;
+/// Candidates this close to the longest so far (relative, by their squares) are looked at again:
+/// the quadratic forms that compare them cancel where the contacts are nearly collinear.
+pub(super) const TIE: f64 = 1e-6;
+
+/// The constraints that meet in a vertex of P, by contact and ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Active {
+    /// y_i on ray j_i of its cone, for all three.
+    Rays([usize; 3]),
+    /// y of the first contact at the apex, of the second on a ray, of the third on the face
+    /// between a ray and the next.
+    Apex {
+        apex: usize,
+        ray: (usize, usize),
+        face: (usize, usize),
+    },
+}
+
+/// A vertex of P, or a point on an edge or face of P that rounding took for one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Vertex {
+    /// (v, ω) in the object frame, on the boundary of P.
+    pub twist: Twist,
+    /// ‖x‖².
+    pub norm_squared: f64,
+    /// Did the candidate satisfy all constraints to rounding before it was scaled?
+    pub exact: bool,
+    pub active: Active,
+}
+
+/// What to look for in P.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Question {
+    /// The longest twist.
+    Longest,
+    /// The longest, or any one longer than this (by its square).
+    LongestUpTo(f64),
+    /// All that are longer than this (by its square), but not more than so many.
+    All(f64, usize),
+}
+
+/// Working memory for the exact quality of grasps with three contacts.
+#[derive(Debug, Clone)]
+pub(crate) struct Kernel {
+    arch: Arch,
+    pub(super) plane: Plane,
+    /// Per ray: components along two sides of the triangle; see [`Kernel::rays`].
+    pub(super) pairs: [[Vec<Lanes>; 2]; 3],
+    /// Per ray of contact 3: b², bc, c², bz, cz, z² of its components b₃, c₃ and normal one z.
+    pub(super) products: [Vec<Lanes>; 6],
+    /// Of each contact, x, y, z of rays j + 1 and their cross products with rays j in the plane.
+    pub(super) faces: [[Vec<Lanes>; 4]; 3],
+    found: Vec<Vertex>,
+}
+
+impl Kernel {
+    pub fn new(cone: &FrictionCone) -> Self {
+        let plane = Plane::new(cone);
+        let zeros = plane.sides[0].ray[0].clone();
+        Self {
+            arch: Arch::new(),
+            plane,
+            pairs: std::array::from_fn(|_| [zeros.clone(), zeros.clone()]),
+            products: std::array::from_fn(|_| zeros.clone()),
+            faces: std::array::from_fn(|_| std::array::from_fn(|_| zeros.clone())),
+            found: Vec::new(),
+        }
+    }
+
+    /// The longest admissible twist, or `None` where the grasp is not force closure (Q = 0).
+    #[inline]
+    pub fn longest(&mut self, contacts: &[Contact; 3], center: DVec3) -> Option<Vertex> {
+        self.ask(contacts, center, Question::Longest)
+            .then(|| self.found[0])
+    }
+
+    /// As [`Kernel::longest`], but content with any twist longer than 1/`threshold`: one such is
+    /// the proof that Q < `threshold`.
+    #[inline]
+    pub fn longest_up_to(
+        &mut self,
+        contacts: &[Contact; 3],
+        center: DVec3,
+        threshold: f64,
+    ) -> Option<Vertex> {
+        let limit = 1.0 / (threshold * threshold);
+        self.ask(contacts, center, Question::LongestUpTo(limit))
+            .then(|| self.found[0])
+    }
+
+    /// Vertices of P that belong to the facets of the hull within `distance` of the origin, at
+    /// most `most`, the nearest first and always among them; `None` where the grasp is not force
+    /// closure.
+    pub fn within(
+        &mut self,
+        contacts: &[Contact; 3],
+        center: DVec3,
+        distance: f64,
+        most: usize,
+    ) -> Option<&[Vertex]> {
+        let limit = 1.0 / (distance * distance);
+        self.ask(contacts, center, Question::All(limit, most));
+        self.found.retain(|vertex| vertex.exact);
+        if self.found.is_empty() && !self.ask(contacts, center, Question::Longest) {
+            return None;
+        }
+        self.sort_found(most);
+        Some(&self.found)
+    }
+
+    /// Longest first, the `most` longest.
+    fn sort_found(&mut self, most: usize) {
+        self.found
+            .sort_by(|a, b| b.norm_squared.total_cmp(&a.norm_squared));
+        self.found.truncate(most);
+    }
+
+    /// Fills `found`; false where the grasp is not force closure.
+    #[inline]
+    fn ask(&mut self, contacts: &[Contact; 3], center: DVec3, question: Question) -> bool {
+        self.arch.dispatch(Ask {
+            kernel: self,
+            contacts,
+            center,
+            question,
+        })
+    }
+
+    /// Takes a proposed twist (in the frame of the plane) if, once it is on the boundary of P, it
+    /// is longer than the limit.
+    #[inline(always)]
+    pub(super) fn offer(
+        &mut self,
+        twist: Twist,
+        active: Active,
+        question: Question,
+        limit: &mut f64,
+    ) -> ControlFlow<()> {
+        let velocity = DVec3::new(twist[0], twist[1], twist[2]);
+        let omega = DVec3::new(twist[3], twist[4], twist[5]);
+        // The padding's zeros do no harm: the support is positive.
+        let mut supports = [0.0; LANES];
+        for side in &self.plane.sides {
+            let v = velocity + omega.cross(side.point.extend(0.0) - self.plane.center);
+            let [xs, ys, zs] = &side.edge;
+            for (x, (y, z)) in xs.iter().zip(ys.iter().zip(zs)) {
+                for lane in 0..LANES {
+                    let along = x[lane] * v.x + y[lane] * v.y + z[lane] * v.z;
+                    supports[lane] = greatest(along, supports[lane]);
+                }
+            }
+        }
+        let support = supports.into_iter().fold(0.0, greatest);
+        let norm_squared = dot(&twist, &twist) / (support * support);
+        // Negated so that NaN, from overflow, is refused; a support of 0 contradicts the test.
+        if !(support > 0.0 && norm_squared > *limit && norm_squared.is_finite()) {
+            return ControlFlow::Continue(());
+        }
+        let linear = self.plane.basis.mul_vec3(velocity / support);
+        let angular = self.plane.basis.mul_vec3(omega / support);
+        let vertex = Vertex {
+            twist: [
+                linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+            ],
+            norm_squared,
+            exact: (support - 1.0).abs() < 1e-9,
+            active,
+        };
+        if let Question::All(_, most) = question {
+            self.found.push(vertex);
+            if self.found.len() == 4 * most {
+                self.sort_found(2 * most);
+                *limit = self.found[2 * most - 1].norm_squared;
+            }
+            return ControlFlow::Continue(());
+        }
+        self.found.clear();
+        self.found.push(vertex);
+        *limit = norm_squared;
+        match question {
+            Question::LongestUpTo(enough) if norm_squared > enough => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// [`Kernel::ask`], compiled for each instruction set and chosen at run time.
+struct Ask<'a> {
+    kernel: &'a mut Kernel,
+    contacts: &'a [Contact; 3],
+    center: DVec3,
+    question: Question,
+}
+
+impl WithSimd for Ask<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let Self {
+            kernel,
+            contacts,
+            center,
+            question,
+        } = self;
+        kernel.found.clear();
+        if !kernel.plane.set_up(contacts) || !kernel.plane.force_closure() {
+            return false;
+        }
+        kernel.plane.set_up_rays(contacts, center);
+        let mut limit = match question {
+            Question::All(limit, _) => limit,
+            _ => 0.0,
+        };
+        kernel.project_faces();
+        if kernel.apexes(simd, question, &mut limit).is_continue() {
+            let _ = kernel.rays(simd, question, &mut limit);
+        }
+        !kernel.found.is_empty()
+    }
+}
+
+#[inline(always)]
+pub(super) fn at(rows: &[Lanes], index: usize) -> f64 {
+    rows[index / LANES][index % LANES]
+}
+
+#[inline(always)]
+pub(super) fn ray(plane: &Plane, contact: usize, index: usize) -> DVec3 {
+    let [x, y, z] = &plane.sides[contact].ray;
+    DVec3::new(at(x, index), at(y, index), at(z, index))
+}
+
+/// Without the care for NaN that `f64::max` takes: one instruction.
+#[inline(always)]
+fn greatest(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}

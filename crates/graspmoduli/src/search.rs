@@ -1,0 +1,368 @@
+//! The best of all triples of given contacts, exactly, without evaluating most of them.
+//!
+//! For any unit twist v, h(v) = max_ij ⟨v, w_ij⟩ bounds Q from above, and the maximum over a
+//! triple is that of its contacts' own maxima, which depend on the contact and v alone. So a table
+//! of these maxima for a few hundred directions answers "is Q below the best so far?" for most
+//! triples by the conjunction of three bit masks. The directions are those in which earlier
+//! triples failed.
+
+use crate::contact::{Contact, Frame, FrictionCone};
+use crate::error::Error;
+use crate::quality::{Kernel, Twist, quality_of};
+use glam::DVec3;
+use multiversion::multiversion;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+const WORDS: usize = 4;
+/// One bit per direction.
+type Mask = [u64; WORDS];
+const DIRECTIONS: usize = 64 * WORDS;
+
+/// Between two calls of the progress function.
+const TICK: Duration = Duration::from_millis(100);
+
+/// Three of the given contacts, by index, and their Q_l.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ranked {
+    /// Q_l > 0.
+    pub quality: f64,
+    /// Ascending indices of the contacts.
+    pub indices: [usize; 3],
+}
+
+/// The `top` best force-closure grasps among all triples of `contacts`, best first, equal ones by
+/// their indices; fewer if there are fewer. The result does not depend on `threads`.
+///
+/// `progress(done, total)` is called now and then from the calling thread, in triples, and may ask
+/// to stop: then the answer is [`Error::Interrupted`].
+pub fn best_triples(
+    contacts: &[Contact],
+    center_of_mass: DVec3,
+    cone: &FrictionCone,
+    top: usize,
+    threads: usize,
+    mut progress: impl FnMut(u64, u64) -> ControlFlow<()>,
+) -> Result<Vec<Ranked>, Error> {
+    let n = contacts.len();
+    let total = triples(n);
+    if total == 0 || top == 0 {
+        return Ok(Vec::new());
+    }
+    let board = Board::new(top);
+    let mut first = Worker::new(contacts, center_of_mass, cone, &board);
+    first.seed(total);
+    let next = AtomicUsize::new(0);
+    let stop = AtomicBool::new(false);
+    let done = AtomicU64::new(0);
+    let running = Mutex::new(threads.max(1));
+    let finished = Condvar::new();
+    let work = |mut worker: Worker| {
+        loop {
+            let a = next.fetch_add(1, Ordering::Relaxed);
+            if a + 2 >= n || stop.load(Ordering::Relaxed) {
+                break;
+            }
+            worker.all_with_first(a, &stop);
+            done.fetch_add(triples(n - a) - triples(n - a - 1), Ordering::Relaxed);
+        }
+        *running.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
+        finished.notify_one();
+    };
+    // A short search is over before threads have started.
+    if threads <= 1 && total < 100_000 {
+        work(first);
+    } else {
+        std::thread::scope(|scope| {
+            for _ in 1..threads.max(1) {
+                let worker = first.clone();
+                scope.spawn(|| work(worker));
+            }
+            scope.spawn(|| work(first));
+            let mut left = running.lock().unwrap_or_else(PoisonError::into_inner);
+            while *left > 0 {
+                left = finished
+                    .wait_timeout(left, TICK)
+                    .map_or_else(|poisoned| poisoned.into_inner().0, |(guard, _)| guard);
+                if progress(done.load(Ordering::Relaxed), total).is_break() {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+        });
+    }
+    if stop.load(Ordering::Relaxed) {
+        return Err(Error::Interrupted);
+    }
+    Ok(board.into_best())
+}
+
+/// The same for some triples only, in the order in which they are worth trying; on this thread.
+pub(crate) fn best_of(
+    contacts: &[Contact],
+    center_of_mass: DVec3,
+    cone: &FrictionCone,
+    top: usize,
+    triples: impl Iterator<Item = [usize; 3]>,
+) -> Vec<Ranked> {
+    let board = Board::new(top);
+    let mut worker = Worker::new(contacts, center_of_mass, cone, &board);
+    for triple in triples {
+        if worker.may_enter(triple) {
+            worker.evaluate(triple);
+        }
+    }
+    board.into_best()
+}
+
+/// n choose 3.
+fn triples(n: usize) -> u64 {
+    let n = n as u64;
+    if n < 3 { 0 } else { n * (n - 1) * (n - 2) / 6 }
+}
+
+/// The best so far, shared by all workers.
+struct Board {
+    top: usize,
+    best: Mutex<Vec<Ranked>>,
+    /// Bits of the quality that a grasp must reach to enter; positive floats order as integers.
+    threshold: AtomicU64,
+}
+
+impl Board {
+    fn new(top: usize) -> Self {
+        Self {
+            top,
+            best: Mutex::new(Vec::new()),
+            threshold: AtomicU64::new(0),
+        }
+    }
+
+    fn threshold(&self) -> f64 {
+        f64::from_bits(self.threshold.load(Ordering::Relaxed))
+    }
+
+    fn offer(&self, candidate: Ranked) {
+        let mut best = self.best.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = best.partition_point(|other| {
+            (-other.quality, other.indices) < (-candidate.quality, candidate.indices)
+        });
+        if best
+            .get(place)
+            .is_some_and(|other| other.indices == candidate.indices)
+        {
+            return;
+        }
+        best.insert(place, candidate);
+        best.truncate(self.top);
+        if best.len() == self.top {
+            let lowest = best[self.top - 1].quality;
+            self.threshold.store(lowest.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    fn into_best(self) -> Vec<Ranked> {
+        self.best
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[derive(Clone)]
+struct Worker<'a> {
+    contacts: &'a [Contact],
+    center: DVec3,
+    board: &'a Board,
+    kernel: Kernel,
+    /// Wrenches of all contacts, `edges` each.
+    wrenches: Vec<Twist>,
+    edges: usize,
+    /// Rounding error of a support value.
+    margin: f64,
+    /// Per direction, the maximum of ⟨v, w⟩ over each contact's wrenches.
+    supports: Vec<Vec<f64>>,
+    /// Where the next direction goes once the table is full.
+    oldest: usize,
+    /// Per contact, in which directions its maximum is below the threshold.
+    masks: Vec<Mask>,
+    threshold: f64,
+}
+
+impl<'a> Worker<'a> {
+    fn new(contacts: &'a [Contact], center: DVec3, cone: &FrictionCone, board: &'a Board) -> Self {
+        let wrenches: Vec<Twist> = contacts
+            .iter()
+            .flat_map(|contact| {
+                let frame = Frame::new(contact.normal);
+                (0..cone.len()).map(move |j| {
+                    let force = cone.edge(&frame, j);
+                    let torque = (contact.point - center).cross(force);
+                    [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+                })
+            })
+            .collect();
+        let longest = wrenches
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |longest, x| longest.max(x.abs()));
+        Self {
+            contacts,
+            center,
+            board,
+            kernel: Kernel::new(cone),
+            wrenches,
+            edges: cone.len(),
+            margin: 1e-13 * longest,
+            supports: Vec::new(),
+            oldest: 0,
+            masks: vec![[0; WORDS]; contacts.len()],
+            threshold: 0.0,
+        }
+    }
+
+    /// A first threshold and first directions: some triples spread over all, then the best of
+    /// them improved by exchanging one contact at a time.
+    fn seed(&mut self, total: u64) {
+        let n = self.contacts.len();
+        // A fixed linear congruential sequence: the result must not depend on chance.
+        let mut state = 1u64;
+        let mut draw = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            ((state >> 33) as usize) % n
+        };
+        let mut best = (0.0, [0, 1, 2]);
+        for _ in 0..(total / 16).min(512) {
+            let indices = [draw(), draw(), draw()];
+            let quality = self.evaluate(indices);
+            if quality > best.0 {
+                best = (quality, indices);
+            }
+        }
+        for slot in (0..3).cycle().take(6) {
+            for other in 0..n {
+                let mut indices = best.1;
+                indices[slot] = other;
+                let quality = self.evaluate(indices);
+                if quality > best.0 {
+                    best = (quality, indices);
+                }
+            }
+        }
+    }
+
+    fn all_with_first(&mut self, a: usize, stop: &AtomicBool) {
+        let n = self.contacts.len();
+        for b in a + 1..n - 1 {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            let mut c = b + 1;
+            loop {
+                // A new threshold or direction changes the masks: look at them afresh each time.
+                let pair = std::array::from_fn(|w| self.masks[a][w] & self.masks[b][w]);
+                c = first_open(&pair, &self.masks, c);
+                if c == n {
+                    break;
+                }
+                self.evaluate([a, b, c]);
+                c += 1;
+            }
+        }
+    }
+
+    /// Is there no direction in which the triple is known to stay below the threshold?
+    fn may_enter(&self, [a, b, c]: [usize; 3]) -> bool {
+        let [a, b, c] = [a, b, c].map(|i| &self.masks[i]);
+        (0..WORDS).all(|w| a[w] & b[w] & c[w] == 0)
+    }
+
+    /// Q of three contacts if it reaches the threshold, else 0; tells the board.
+    fn evaluate(&mut self, mut indices: [usize; 3]) -> f64 {
+        indices.sort_unstable();
+        let [a, b, c] = indices;
+        if a == b || b == c {
+            return 0.0;
+        }
+        if self.board.threshold() > self.threshold {
+            self.raise_threshold();
+        }
+        let grasp = indices.map(|i| self.contacts[i]);
+        let Some(vertex) = self
+            .kernel
+            .longest_up_to(&grasp, self.center, self.threshold)
+        else {
+            return 0.0;
+        };
+        let quality = quality_of(vertex);
+        if quality < self.threshold {
+            self.add_direction(vertex.twist.map(|x| x * quality));
+            return 0.0;
+        }
+        self.board.offer(Ranked { quality, indices });
+        if self.supports.len() < DIRECTIONS {
+            self.add_direction(vertex.twist.map(|x| x * quality));
+        }
+        quality
+    }
+
+    fn add_direction(&mut self, direction: Twist) {
+        let supports: Vec<f64> = supports(&self.wrenches, self.edges, &direction);
+        let slot = self.supports.len();
+        let slot = if slot < DIRECTIONS {
+            self.supports.push(supports);
+            slot
+        } else {
+            self.oldest = (self.oldest + 1) % DIRECTIONS;
+            self.supports[self.oldest] = supports;
+            self.oldest
+        };
+        self.mark(slot);
+    }
+
+    fn raise_threshold(&mut self) {
+        self.threshold = self.board.threshold();
+        for slot in 0..self.supports.len() {
+            self.mark(slot);
+        }
+    }
+
+    /// Sets the bits of one direction.
+    fn mark(&mut self, slot: usize) {
+        let bar = self.threshold - self.margin;
+        let (word, bit) = (slot / 64, slot % 64);
+        for (mask, &support) in self.masks.iter_mut().zip(&self.supports[slot]) {
+            mask[word] = mask[word] & !(1 << bit) | u64::from(support < bar) << bit;
+        }
+    }
+}
+
+/// The first index from `from` on whose mask has no bit in common with the pair's.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn first_open(pair: &Mask, masks: &[Mask], from: usize) -> usize {
+    for (offset, mask) in masks[from..].iter().enumerate() {
+        let mut common = 0;
+        for word in 0..WORDS {
+            common |= pair[word] & mask[word];
+        }
+        if common == 0 {
+            return from + offset;
+        }
+    }
+    masks.len()
+}
+
+/// max ⟨direction, w⟩ over each contact's wrenches.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn supports(wrenches: &[Twist], edges: usize, direction: &Twist) -> Vec<f64> {
+    wrenches
+        .chunks_exact(edges)
+        .map(|own| {
+            own.iter()
+                .map(|w| w.iter().zip(direction).map(|(a, b)| a * b).sum::<f64>())
+                .fold(f64::NEG_INFINITY, f64::max)
+        })
+        .collect()
+}

@@ -1,0 +1,31 @@
+"""Exact grasp quality of three contacts, what it means, and its gradient."""
+
+import numpy as np
+
+import graspmoduli as gm
+
+# Three fingers around a can of radius 3 cm, at the height of its centre of mass, in metres.
+angle = 2 * np.pi * np.arange(3) / 3
+outward = np.stack([np.cos(angle), np.sin(angle), np.zeros(3)], axis=1)
+contacts, normals, center = 0.03 * outward, -outward, np.zeros(3)
+
+for friction in (0.3, 0.6, 1.0):
+    value = gm.quality(contacts, normals, center, friction=friction)
+    print(f"μ = {friction}: Q_8 = {value:.5f}")
+
+# Torques carry the unit of length: in metres the twist about the axis decides, in units of the
+# can's radius forces and torques count alike.
+print(f"lengths over the radius: Q_8 = {gm.quality(contacts / 0.03, normals, center):.5f}")
+
+# A thousand graspers with shaky hands, evaluated at once.
+rng = np.random.default_rng(0)
+shaky = contacts + 0.004 * rng.normal(size=(1000, 3, 3))
+values = gm.quality(shaky, normals, center)
+print(f"with 4 mm of error: {np.mean(values > 0):.1%} still hold, worst {values.min():.5f}")
+
+# The exact gradient says where the fingers of the worst one should move to hold better.
+worst = shaky[values.argmin()] / 0.03
+gradient = gm.quality_gradient(worst, normals, center)
+step = 0.05 * gradient.contacts / np.linalg.norm(gradient.contacts)
+print(f"the worst: Q_8 = {gradient.value:.4f}; moved by 5 % of the radius along the gradient, "
+      f"{gm.quality(worst + step, normals, center):.4f}")  # fmt: skip

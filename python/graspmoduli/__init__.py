@@ -1,0 +1,35 @@
+"""Exact grasp quality, and grasps on families of shapes.
+
+=====================  ======================================================================
+grasp quality          :func:`quality`, :func:`quality_gradient`
+surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
+grasps                 :class:`Grasp`, :func:`place`
+finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
+real objects           :func:`fit`
+errors                 :class:`GraspModuliError`
+=====================  ======================================================================
+
+The mathematics is that of F. T. Pokorny, K. Hang, D. Kragic, *Grasp Moduli Spaces*, RSS 2013.
+Arrays are float64 with leading batch shapes, angles are in radians, lengths in the unit of the
+object, normals point into it.
+"""
+
+from . import shapes as shapes
+from ._core import GraspModuliError as GraspModuliError
+from .fitting import Fit as Fit
+from .fitting import ObjectGrasp as ObjectGrasp
+from .fitting import Residual as Residual
+from .fitting import fit as fit
+from .grasps import Grasp as Grasp
+from .grasps import PlacedGrasp as PlacedGrasp
+from .grasps import RankedGrasp as RankedGrasp
+from .grasps import place as place
+from .quality import QualityGradient as QualityGradient
+from .quality import quality as quality
+from .quality import quality_gradient as quality_gradient
+from .sampling import sample_points as sample_points
+from .surfaces import Surface as Surface
+from .surfaces import combine as combine
+from .surfaces import project as project
+from .synthesis import best_grasps as best_grasps
+from .synthesis import synthesize as synthesize

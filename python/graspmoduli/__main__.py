@@ -1,0 +1,5 @@
+"""``python -m graspmoduli``."""
+
+from .cli import main
+
+main()

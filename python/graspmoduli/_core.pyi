@@ -1,0 +1,57 @@
+"""The compiled kernels. Arguments are checked by the callers; arrays are contiguous float64."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+class GraspModuliError(ValueError):
+    """Wrong input: names the argument, what was wanted and what came."""
+
+def quality(
+    contacts: Floats, normals: Floats, center_of_mass: Floats, friction: float, edges: int
+) -> Floats: ...
+def quality_gradient(
+    contacts: Floats, normals: Floats, center_of_mass: Floats, friction: float, edges: int
+) -> Floats: ...
+
+class Surface:
+    def __new__(cls, bottom: float, top: float, coefficients: Floats) -> Surface: ...
+    @property
+    def bottom(self) -> float: ...
+    @property
+    def top(self) -> float: ...
+    @property
+    def coefficients(self) -> Floats: ...
+    def radius(self, u: Floats, theta: Floats) -> Floats: ...
+    def place(self, u: Floats, theta: Floats) -> Floats: ...
+    def integrals(
+        self, steps: int | None = None
+    ) -> tuple[float, list[float], float, list[float]]: ...
+    def radius_about(self, center: tuple[float, float, float]) -> float: ...
+    def project(self) -> Surface: ...
+
+def combine(weights: Sequence[float], surfaces: Sequence[Surface]) -> Surface: ...
+def sample_points(surface: Surface, square: Floats) -> Floats: ...
+def best_triples(
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: tuple[float, float, float],
+    friction: float,
+    edges: int,
+    top: int,
+    threads: int,
+    progress: Callable[[int, int], object] | None,
+) -> list[tuple[list[int], float]]: ...
+def synthesize(
+    surface: Surface,
+    center_of_mass: tuple[float, float, float],
+    friction: float,
+    edges: int,
+    top: int,
+    starts: int,
+    square: Floats,
+    allowed: NDArray[np.bool_] | None,
+) -> Floats: ...

@@ -1,0 +1,234 @@
+"""The command line: ``graspmoduli grasp OBJECT``."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from . import _arrays
+from ._core import GraspModuliError
+from ._files import replacing
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Grasps for real objects, ranked by exact grasp quality.",
+)
+
+#: Pictures by the ending of their file's name.
+PICTURES = (".png", ".svg", ".pdf", ".jpg", ".jpeg", ".webp")
+
+
+def main() -> None:
+    """Entry point: errors are one line on standard error; wrong input exits with 2."""
+    code = None
+    try:
+        code = app(standalone_mode=False)
+    except GraspModuliError as error:
+        _fail(str(error))
+    except (KeyboardInterrupt, EOFError):
+        print("graspmoduli: interrupted", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except Exception as error:
+        # Usage errors of the command-line library carry their own sentence.
+        message = getattr(error, "format_message", None)
+        if message is None:
+            if type(error).__name__ == "Abort":
+                sys.exit(130)
+            raise
+        _fail(" ".join(message().split()))
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(message: str) -> None:
+    print(f"graspmoduli: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    show_version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if show_version:
+        print(version("graspmoduli"))
+        raise typer.Exit()
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def grasp(
+    thing: Annotated[
+        str,
+        typer.Argument(metavar="OBJECT", help="Mesh or point cloud (PLY OBJ STL GLB PCD XYZ NPY)."),
+    ],
+    friction: Annotated[str, typer.Option(help="Coulomb friction coefficient μ > 0.")] = "1.0",
+    edges: Annotated[str, typer.Option(help="Edges l of the friction cones, at least 3.")] = "8",
+    top: Annotated[str, typer.Option(help="How many different grasps.")] = "5",
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write grasps and fit here.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw object and grasps here (PNG SVG PDF JPG)."),
+    ] = None,
+    seed: Annotated[str, typer.Option(help="Seed of sampled contacts.")] = "0",
+) -> None:
+    """Find stable three-finger grasps of OBJECT, best first, in its own coordinates."""
+    mu = _number("friction", friction, float)
+    l = _number("edges", edges, int)
+    _arrays.cone(mu, l)
+    count = _arrays.count("top", _number("top", top, int), 1)
+    start = _arrays.count("seed", _number("seed", seed, int), 0)
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        raise GraspModuliError(
+            f"picture must be a file of a known format ({' '.join(PICTURES)}), got {picture.name}"
+        )
+    # Outputs that cannot be written are found out before the work; both appear at the end.
+    with contextlib.ExitStack() as outputs:
+        json_path = outputs.enter_context(replacing(json_file)) if json_file else None
+        picture_path = outputs.enter_context(replacing(picture)) if picture else None
+        with _progress() as step, _warnings():
+            found = _find(thing, mu, l, count, start, step)
+            if json_path is not None:
+                json_path.write_text(json.dumps(_report(thing, *found[1:], mu, l), indent=2) + "\n")
+            if picture_path is not None:
+                step("drawing", 0.85)
+                from .plotting import plot_grasps
+
+                figure = plot_grasps(*found, friction=mu, edges=l, title=Path(thing).name)
+                figure.savefig(picture_path)
+    _, fit, grasps = found
+    _print(thing, fit, grasps, l)
+    for path in (json_file, picture):
+        if path is not None:
+            print(f"wrote {path}")
+    if not grasps:
+        print(
+            "graspmoduli: no force-closure grasp found; more friction or a fuller scan may help",
+            file=sys.stderr,
+        )
+        raise typer.Exit(1)
+
+
+def _find(
+    path: str, friction: float, edges: int, top: int, seed: int, step: Callable[[str, float], None]
+) -> tuple[Any, Any, Any]:
+    step("reading", 0.0)
+    from .reading import read
+
+    thing = read(path)
+    step("fitting", 0.1)
+    from .fitting import fit_object
+
+    fit = fit_object(thing, lambda done, total: step("fitting", 0.1 + 0.65 * done / total))
+    step("finding grasps", 0.8)
+    return thing, fit, fit.synthesize(top=top, friction=friction, edges=edges, seed=seed)
+
+
+def _report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> dict[str, Any]:
+    return {
+        "object": path,
+        "fit": {
+            "residual_rms": fit.residual.rms,
+            "residual_max": fit.residual.max,
+            "size": fit.residual.size,
+            "coverage": fit.coverage,
+            "unexplained": fit.unexplained,
+            "pose": fit.pose.tolist(),
+        },
+        "friction": friction,
+        "edges": edges,
+        "length_scale": fit.length_scale,
+        "note": "contacts, normals and center_of_mass are in the coordinates of the object's "
+        "file; quality is that of lengths divided by length_scale",
+        "grasps": [
+            {
+                "quality": grasp.quality,
+                "contacts": grasp.contacts.tolist(),
+                "normals": grasp.normals.tolist(),
+                "center_of_mass": grasp.center_of_mass.tolist(),
+                "u": grasp.grasp.u.tolist(),
+                "theta": grasp.grasp.theta.tolist(),
+            }
+            for grasp in grasps
+        ],
+    }
+
+
+def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
+    axis = ", ".join(f"{x:+.2f}" for x in fit.pose[:3, 2])
+    lines = [
+        f"{path}: size {fit.residual.size:.4g}, axis ({axis})",
+        f"fit: rms {fit.residual.relative_rms:.2%} and max {fit.residual.relative_max:.2%} of the "
+        f"size, {fit.coverage:.0%} of the surface seen, "
+        f"{fit.unexplained:.1%} of the wall unexplained",
+    ]
+    table = Table(box=None, padding=(0, 2), header_style="bold")
+    table.add_column("#", justify="right")
+    table.add_column(f"Q_{edges}", justify="right")
+    for finger in (1, 2, 3):
+        table.add_column(f"finger {finger}  (x, y, z)", justify="right")
+    digits = max(0, 3 - int(f"{fit.residual.size:e}".split("e")[1]))
+    for rank, grasp in enumerate(grasps, 1):
+        points = [", ".join(f"{x:.{digits}f}" for x in point) for point in grasp.contacts]
+        table.add_row(str(rank), f"{grasp.quality:.4f}", *points)
+    # Wide enough for the table when the output is not a terminal.
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+    for line in lines:
+        console.print(line, soft_wrap=True, markup=False)
+    if grasps:
+        console.print()
+        console.print(table)
+        console.print(
+            f"\nQ_{edges}: the largest wrench, in any direction, resisted by fingers whose normal "
+            f"forces sum to 1; lengths divided by {fit.length_scale:.4g}.",
+            soft_wrap=True,
+            markup=False,
+        )
+
+
+def _number(name: str, text: str, kind: type) -> Any:
+    try:
+        return kind(text)
+    except ValueError:
+        wanted = "a whole number" if kind is int else "a number"
+        raise GraspModuliError(f"{name} must be {wanted}, got {text!r}") from None
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar with an estimate on standard error, if that is a terminal; it vanishes at the end."""
+    columns = (TextColumn("{task.description:<15}"), BarColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    hidden = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda name, share: bar.update(task, description=name, completed=share)
+
+
+@contextlib.contextmanager
+def _warnings() -> Iterator[None]:
+    """Warnings as one line each."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        yield
+    for warning in caught:
+        if issubclass(warning.category, UserWarning):
+            print(f"graspmoduli: warning: {warning.message}", file=sys.stderr)

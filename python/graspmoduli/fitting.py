@@ -1,0 +1,270 @@
+"""Fitting a surface with cylindrical coordinates to a real object (Sec. III of the paper).
+
+The paper proposes regression in cylindrical coordinates about the most dominant axis. Here the
+axis is chosen among candidates by how well the outer wall about it is such a surface, and the
+regression is that of penalised splines (Eilers & Marx 1996) with robust weights.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ._arrays import Floats, count, locked
+from ._core import GraspModuliError
+from .axes import candidate_axes, refined, same_axis, score
+from .grasps import Grasp
+from .quality import quality
+from .reading import Object, read
+from .surfaces import Surface
+from .synthesis import synthesize
+from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
+
+#: More unexplained than this is refused.
+MOST_UNEXPLAINED = 0.4
+#: More unexplained than this is worth a warning.
+WORTH_A_WARNING = 0.005
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Distance of the object's outer wall from the fitted surface, where it explains the wall."""
+
+    #: Root mean square, in the unit of the object.
+    rms: float
+    #: Largest, in the unit of the object.
+    max: float
+    #: The object's largest extent, in its unit.
+    size: float
+
+    @property
+    def relative_rms(self) -> float:
+        """rms / size."""
+        return self.rms / self.size
+
+    @property
+    def relative_max(self) -> float:
+        """max / size."""
+        return self.max / self.size
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectGrasp:
+    """A grasp in the coordinates of a real object."""
+
+    #: Contact coordinates on the fitted surface.
+    grasp: Grasp
+    #: Q_l of what follows, with lengths divided by ``length_scale``.
+    quality: float
+    #: Contact points, in the unit of the object. Shape (3, 3).
+    contacts: Floats
+    #: Unit normals pointing into the object. Shape (3, 3).
+    normals: Floats
+    #: Centre of mass of the fitted surface. Shape (3,).
+    center_of_mass: Floats
+    #: The object's radius about its centre of mass.
+    length_scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A surface fitted to an object."""
+
+    #: The surface, about its own axis, in the unit of the object.
+    surface: Surface
+    #: Rigid motion from the surface's coordinates to the object's. Shape (4, 4).
+    pose: Floats
+    residual: Residual
+    #: Share of the surface's area where the object was seen; the rest is filled in smoothly.
+    coverage: float
+    #: Share of the object's outer wall that is not within 2 % of its size of the surface.
+    unexplained: float
+    #: Where contacts may lie: cells over u and θ that are explained, or unseen. Shape (k, n).
+    allowed: Booleans = field(repr=False)
+
+    @property
+    def length_scale(self) -> float:
+        """The surface's radius about its centre of mass: lengths are divided by it for Q_l."""
+        return self.surface.radius_about(self.surface.center_of_mass)
+
+    def synthesize(
+        self, *, top: int = 5, friction: float = 1.0, edges: int = 8, seed: int = 0
+    ) -> list[ObjectGrasp]:
+        """Different grasps of high quality in the object's own coordinates, best first.
+
+        :func:`graspmoduli.synthesize` on the fitted surface, with contacts only where the object
+        is explained by it or was not seen. Lengths are divided by :attr:`length_scale` for the
+        quality, which therefore does not depend on the object's unit.
+        """
+        scale = self.length_scale
+        # Where contacts are not allowed everywhere, more starts find better grasps.
+        found = synthesize(
+            (1.0 / scale) * self.surface,
+            top=top,
+            starts=2 * count("top", top, 1) + 6,
+            friction=friction,
+            edges=edges,
+            seed=seed,
+            allowed=self.allowed,
+        )
+        center = locked(self.to_object(self.surface.center_of_mass))
+        grasps = []
+        for ranked in found:
+            u, theta = ranked.grasp.u, ranked.grasp.theta
+            contacts = locked(self.to_object(self.surface.points(u, theta)))
+            normals = locked(self.directions_to_object(self.surface.normals(u, theta)))
+            # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l
+            # there differs slightly from the surface's own.
+            value = quality(
+                contacts / scale, normals, center / scale, friction=friction, edges=edges
+            )
+            if value > 0.0:
+                grasps.append(ObjectGrasp(ranked.grasp, value, contacts, normals, center, scale))
+        return sorted(grasps, key=lambda grasp: -grasp.quality)
+
+    def to_object(self, points: Floats) -> Floats:
+        """Points from the surface's to the object's coordinates. Shape (..., 3)."""
+        return points @ self.pose[:3, :3].T + self.pose[:3, 3]
+
+    def directions_to_object(self, vectors: Floats) -> Floats:
+        """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
+        return vectors @ self.pose[:3, :3].T
+
+
+def fit(
+    points_or_mesh_or_path: Any, *, progress: Callable[[int, int], object] | None = None
+) -> Fit:
+    """The surface with cylindrical coordinates that is closest to a real object.
+
+    Parameters
+    ----------
+    points_or_mesh_or_path
+        Points of shape (n, 3), a trimesh mesh, a pair (vertices, faces), or the path of a PLY,
+        OBJ, STL, GLB, OFF, PCD, XYZ or NPY file. Any unit, any pose; a scan may be noisy and see
+        the object from one side only.
+    progress
+        Called as ``progress(done, total)`` after each axis tried.
+
+    Returns
+    -------
+    Fit
+        Where a ray from the axis crosses several walls, the surface is the outer one; parts that
+        stick out of it, such as a handle, are left unexplained, and a warning says how much.
+
+    Raises
+    ------
+    GraspModuliError
+        If the file cannot be read, holds several objects, or the object is no such surface.
+    """
+    return fit_object(read(points_or_mesh_or_path), progress)
+
+
+def fit_object(thing: Object, progress: Callable[[int, int], object] | None = None) -> Fit:
+    """As :func:`fit`, of an object that has been read."""
+    candidates = candidate_axes(thing)
+    scored: list[tuple[float, Axis]] = []
+    for done, candidate in enumerate(candidates):
+        for axis in (candidate, refined(thing, candidate)):
+            # Several candidates often refine to the same axis.
+            if not any(same_axis(thing, axis, other) for _, other in scored):
+                scored.append((score(thing, axis), axis))
+        if progress is not None:
+            progress(done + 1, len(candidates))
+    lowest, axis = min(scored, key=lambda entry: entry[0])
+    if not np.isfinite(lowest):
+        raise GraspModuliError(
+            "object must have an outer wall around some axis, got too little of one"
+        )
+    return _fit_about(thing, axis)
+
+
+def _fit_about(thing: Object, axis: Axis) -> Fit:
+    mesh = thing.faces is not None
+    hits, grid = fine_hits(thing, axis)
+    coarse, _ = regress(thing, hits, grid, intervals=10, columns=8)
+    intervals, columns, smoothing = (40, 32, FOR_MESHES) if mesh else (20, 24, FOR_SCANS)
+    shape, wall = regress(thing, hits, grid, intervals, columns, smoothing, coarse)
+    # Rows at the very ends cut lids and rims, not the wall.
+    middle = (grid.low + grid.high) / 2
+    surface = Surface.from_coefficients(shape.coefficients, grid.low - middle, grid.high - middle)
+    u = (hits.height - grid.low) / (grid.high - grid.low)
+    normals = surface.normals(np.clip(u, 0.0, 1.0), hits.angle)
+    slant = np.hypot(normals[:, 0], normals[:, 1])
+    distance = (hits.radius - shape.at(hits, grid)) * slant
+    close = CLOSE * thing.size
+    explained = wall & (np.abs(distance) <= close)
+    outside = distance > close
+
+    cells = grid.rows * grid.columns
+    seen = np.bincount(hits.cell[wall], minlength=cells) > 0
+    good = np.bincount(hits.cell[explained], minlength=cells) > 0
+    sticking = np.bincount(hits.cell[outside], minlength=cells) > (0 if mesh else 2)
+    unexplained = float((seen & (~good | sticking)).sum() / max(seen.sum(), 1))
+    if unexplained > MOST_UNEXPLAINED:
+        raise GraspModuliError(
+            "object must be close to a surface in cylindrical coordinates about some axis, "
+            f"got one whose outer wall is not for {unexplained:.0%}"
+        )
+    if unexplained > WORTH_A_WARNING:
+        warnings.warn(
+            f"{unexplained:.1%} of the object's outer wall is not explained by the fitted "
+            "surface; no grasp is offered there",
+            stacklevel=3,
+        )
+    # A wall that leans more than the surface, such as a lid's rim, is not what a finger meets.
+    crooked = np.abs(np.abs(normals[:, 2]) - hits.tilt) > 0.5
+    rough = mesh & (np.bincount(hits.cell[explained & crooked], minlength=cells) > 0)
+    bad = (sticking | rough | (seen & ~good)).reshape(grid.rows, grid.columns)
+    # A fingertip's width away from it.
+    allowed = ~_dilated(bad, 4 if mesh else 2)
+    rim = max(1, round(0.03 * grid.rows))
+    allowed[:rim] = allowed[-rim:] = False
+
+    used = distance[explained]
+    residual = Residual(
+        rms=float(np.sqrt((used**2).mean())), max=float(np.abs(used).max()), size=thing.size
+    )
+    return Fit(
+        surface=surface,
+        pose=_pose(axis, middle),
+        residual=residual,
+        coverage=_coverage(surface, good.reshape(grid.rows, grid.columns), mesh),
+        unexplained=unexplained,
+        allowed=allowed,
+    )
+
+
+def _pose(axis: Axis, middle: float) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3] = axis.rotation
+    pose[:3, 3] = axis.origin + axis.rotation[:, 2] * middle
+    return locked(pose)
+
+
+def _coverage(surface: Surface, good: Booleans, mesh: bool) -> float:
+    """Share of the area in cells that were seen; a cloud may leave small holes between points."""
+    rows, columns = good.shape
+    u, theta = np.meshgrid(
+        (np.arange(rows) + 0.5) / rows,
+        (np.arange(columns) + 0.5) * 2 * np.pi / columns,
+        indexing="ij",
+    )
+    first, second = surface.tangents(u, theta)
+    area = np.linalg.norm(np.cross(first, second), axis=-1)
+    covered = good if mesh else ~_dilated(~_dilated(good, 1), 1)
+    return float(area[covered].sum() / area.sum())
+
+
+def _dilated(cells: Booleans, reach: int) -> Booleans:
+    """Cells and their neighbours; columns wrap around."""
+    out = cells.copy()
+    for _ in range(reach):
+        grown = out | np.roll(out, 1, axis=1) | np.roll(out, -1, axis=1)
+        grown[1:] |= out[:-1]
+        grown[:-1] |= out[1:]
+        out = grown
+    return out

@@ -1,0 +1,41 @@
+"""Contacts distributed uniformly by area (Arvo's method, reference [2] of the paper)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import _core
+from ._arrays import Floats, count, locked
+from .surfaces import Surface
+
+
+def sample_points(surface: Surface, n: int, seed: int = 0) -> tuple[Floats, Floats]:
+    """``n`` contact coordinates, uniform by area and stratified.
+
+    The unit square is cut into n cells of equal area, one point is drawn in each, and the points
+    are mapped to the surface so that equal areas go to equal areas: u by the marginal
+    distribution of the area density ‖t₁ × t₂‖, θ by the conditional one, both inverted by
+    bisection.
+
+    Returns
+    -------
+    u, theta
+        Each of shape (n,), read-only. The same seed gives the same bits.
+    """
+    points = _core.sample_points(surface._core, unit_square(count("n", n, 1), seed))
+    return locked(points[:, 0].copy()), locked(points[:, 1].copy())
+
+
+def unit_square(n: int, seed: int) -> Floats:
+    """``n`` points of the unit square, one in each of n cells of equal area. Shape (n, 2)."""
+    seed = count("seed", seed, 0)
+    jitter = np.random.Generator(np.random.Philox(seed)).random((n, 2))
+    # Rows as high as the share of the n cells that they hold.
+    row_count = max(1, round(n**0.5))
+    row = np.arange(n) * row_count // n
+    starts = np.searchsorted(row, np.arange(row_count + 1))
+    cells = np.diff(starts)[row]
+    column = np.arange(n) - starts[row]
+    return np.stack(
+        [(starts[row] + jitter[:, 0] * cells) / n, (column + jitter[:, 1]) / cells], axis=1
+    )

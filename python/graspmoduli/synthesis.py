@@ -1,0 +1,161 @@
+"""Finding grasps: exhaustive search and synthesis by deformation (Sec. IV.C and IV.E)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._arrays import Floats, cone, coordinates, count, floats
+from ._core import GraspModuliError
+from .grasps import Grasp, RankedGrasp
+from .sampling import unit_square
+from .surfaces import Surface
+
+#: Sampled contacts from which synthesis starts where deformation does not find enough grasps.
+EXTRA_SAMPLES = 40
+
+
+def best_grasps(
+    surface: Surface,
+    u: ArrayLike,
+    theta: ArrayLike,
+    *,
+    contacts: int = 3,
+    top: int = 1,
+    friction: float = 1.0,
+    edges: int = 8,
+    center_of_mass: ArrayLike | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> list[RankedGrasp]:
+    """The best of all subsets of the given contacts, by exact Q_l.
+
+    Parameters
+    ----------
+    surface
+        The object.
+    u, theta
+        Contact coordinates. Shape (n,).
+    contacts
+        Contacts per grasp; 3 in this version.
+    top
+        How many grasps to return. Fewer come back if fewer are force closure.
+    friction, edges
+        As in :func:`graspmoduli.quality`.
+    center_of_mass
+        Shape (3,); the surface's own z_S if not given.
+    threads
+        Number of threads, all cores if not given. The result does not depend on it.
+    progress
+        Called now and then as ``progress(done, total)``, in subsets. Ctrl-C ends the search.
+
+    Returns
+    -------
+    list of RankedGrasp
+        Best first, equal ones in the order of their contacts. The same as evaluating every
+        subset: those that are left out are proven to be worse.
+    """
+    mu, l = cone(friction, edges)
+    us, thetas, shape = coordinates(u, theta)
+    if len(shape) != 1:
+        raise GraspModuliError(f"u and theta must have shape (n,), got {shape}")
+    if count("contacts", contacts, 1) != 3:
+        raise GraspModuliError(f"contacts must be 3 in this version, got {contacts}")
+    if us.size < 3:
+        raise GraspModuliError(f"u and theta must hold at least 3 contacts, got {us.size}")
+    top = count("top", top, 1)
+    workers = _cores() if threads is None else count("threads", threads, 1)
+    ranked = _core.best_triples(
+        np.ascontiguousarray(surface.points(us, thetas)),
+        np.ascontiguousarray(surface.normals(us, thetas)),
+        _center(surface, center_of_mass),
+        mu,
+        l,
+        top,
+        workers,
+        progress,
+    )
+    return [
+        RankedGrasp(Grasp(us[list(indices)], thetas[list(indices)]), value)
+        for indices, value in ranked
+    ]
+
+
+def synthesize(
+    surface: Surface,
+    *,
+    top: int = 5,
+    friction: float = 1.0,
+    edges: int = 8,
+    seed: int = 0,
+    center_of_mass: ArrayLike | None = None,
+    allowed: ArrayLike | None = None,
+    starts: int | None = None,
+) -> list[RankedGrasp]:
+    """Several different three-finger grasps of high quality, from scratch (Sec. IV.E).
+
+    On the surface of revolution π(S) the best triples (u₁, 0), (u₂, π), (u₃, π) are found; turned
+    to several angles, they climb in Q_l while π(S) deforms into S, and then to a local maximum on
+    S itself, by exact gradients of all facets of the wrench hull near the origin. If that finds
+    too few grasps, the ascent also starts from the best of 40 sampled contacts.
+
+    Parameters
+    ----------
+    surface
+        The object.
+    top
+        How many grasps are wanted. Fewer come back if fewer different ones are found.
+    friction, edges
+        As in :func:`graspmoduli.quality`.
+    seed
+        Of the sampled contacts.
+    center_of_mass
+        Shape (3,); the surface's own z_S if not given.
+    allowed
+        Where contacts may lie: booleans over a grid of cells, rows along u and columns along θ.
+        Everywhere if not given.
+    starts
+        How many grasps of the heuristic are followed: more find better ones, and take longer.
+        ``top + 2`` if not given.
+
+    Returns
+    -------
+    list of RankedGrasp
+        Best first. The contacts of any two differ by at least 15 % of the object's radius.
+    """
+    mu, l = cone(friction, edges)
+    top = count("top", top, 1)
+    followed = top + 2 if starts is None else count("starts", starts, 1)
+    cells: NDArray[np.bool_] | None = None
+    if allowed is not None:
+        cells = np.ascontiguousarray(allowed, dtype=np.bool_)
+        if cells.ndim != 2 or not cells.size:
+            raise GraspModuliError(f"allowed must have shape (rows, columns), got {cells.shape}")
+    square = unit_square(EXTRA_SAMPLES, seed)
+    rows = _core.synthesize(
+        surface._core, _center(surface, center_of_mass), mu, l, top, followed, square, cells
+    )
+    return [RankedGrasp(Grasp(row[0:6:2], row[1:6:2]), float(row[6])) for row in rows]
+
+
+def _center(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, float, float]:
+    center: Floats = (
+        surface.center_of_mass
+        if center_of_mass is None
+        else floats("center_of_mass", center_of_mass)
+    )
+    if center.shape != (3,):
+        raise GraspModuliError(f"center_of_mass must have shape (3,), got {center.shape}")
+    return float(center[0]), float(center[1]), float(center[2])
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1

@@ -1,0 +1,35 @@
+"""Shared fixtures."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+def uniform_grasps(n, rng):
+    """Uniform in D(1): contacts and centre of mass in the unit ball, normals on the sphere."""
+
+    def sphere(count):
+        v = rng.normal(size=(count, 3))
+        return v / np.linalg.norm(v, axis=1, keepdims=True)
+
+    def ball(count):
+        return sphere(count) * rng.random((count, 1)) ** (1 / 3)
+
+    return ball(3 * n).reshape(n, 3, 3), sphere(3 * n).reshape(n, 3, 3), ball(n)
+
+
+@pytest.fixture(scope="session")
+def uniform():
+    """200,000 uniform grasps."""
+    return uniform_grasps(200_000, np.random.default_rng(20130624))
+
+
+def objects():
+    """Real meshes: the shipped ones, and more where a folder of them lies beside the checkout."""
+    found = {path.name: path for path in (ROOT / "examples" / "objects").glob("*.ply")}
+    for path in (ROOT.parent / "shared" / "objects").glob("*.ply"):
+        found.setdefault(path.name, path)
+    return [found[name] for name in sorted(found)]

@@ -1,0 +1,318 @@
+"""Q_l of three contacts: published numbers, the twin, invariants, degenerate and wrong input."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import graspmoduli as gm
+import reference
+from conftest import uniform_grasps
+
+ANGLE = 2 * np.pi * np.arange(3) / 3
+CIRCLE = np.stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE], axis=1)
+PINCH = np.array([[1.0, 0, 0], [-1, 0, 0.5], [-1, 0, -0.5]])
+PINCH_NORMALS = np.array([[-1.0, 0, 0], [1, 0, 0], [1, 0, 0]])
+ORIGIN = np.zeros(3)
+
+
+def rotation_about_z(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+
+
+class TestNumbers:
+    def test_three_fingers_on_a_circle(self):
+        assert gm.quality(CIRCLE, -CIRCLE, ORIGIN) == pytest.approx(0.544232186874, abs=5e-13)
+
+    def test_one_finger_against_two(self):
+        value = gm.quality(PINCH, PINCH_NORMALS, ORIGIN)
+        assert value == pytest.approx(0.240427835894, abs=5e-13)
+
+    def test_one_finger_against_two_off_centre(self):
+        contacts = PINCH.copy()
+        contacts[0, 2] = 0.25
+        value = gm.quality(contacts, PINCH_NORMALS, ORIGIN)
+        assert value == pytest.approx(0.225299014077, abs=5e-13)
+
+    def test_shares_of_uniform_grasps_are_the_published_ones(self):
+        n = 2_000_000
+        q = gm.quality(*uniform_grasps(n, np.random.default_rng(1)))
+
+        def four_sigma(share):
+            return 4 * np.sqrt(share * (1 - share) / n)
+
+        assert (q >= 0.05).mean() == pytest.approx(0.0413, abs=four_sigma(0.0413) + 0.0002)
+        assert (q >= 0.2).mean() == pytest.approx(0.00064, abs=four_sigma(0.00064) + 0.00001)
+        assert (q == 0).mean() == pytest.approx(0.8707, abs=four_sigma(0.8707) + 0.0003)
+
+    def test_where_only_two_contacts_carry_the_quality_is_exactly_0(self, uniform):
+        # 3.4 % of uniform grasps have 0 on the boundary of the hull: linear programming finds
+        # an equilibrium, but none that uses all wrenches.
+        contacts, normals, centers = (array[:1500] for array in uniform)
+        q = gm.quality(contacts, normals, centers)
+        boundary = 0
+        for i in range(len(q)):
+            margin = reference.force_closure_margin(contacts[i], normals[i], centers[i])
+            assert (q[i] > 0) == (margin > 1e-9)
+            boundary += abs(margin) <= 1e-9
+        assert boundary / len(q) == pytest.approx(0.034, abs=4 * np.sqrt(0.034 / len(q)))
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.5, 1.0])
+@pytest.mark.parametrize("edges", [4, 8, 13])
+def test_values_agree_with_qhull(uniform, friction, edges):
+    q = gm.quality(*uniform, friction=friction, edges=edges)
+    chosen = [*np.flatnonzero(q > 0)[:250], *range(60)]
+    for i in chosen:
+        contacts, normals, center = (array[i] for array in uniform)
+        wanted = reference.quality(contacts, normals, center, friction, edges)
+        assert q[i] == pytest.approx(max(wanted, 0.0), abs=1e-9)
+
+
+class TestInvariance:
+    @pytest.fixture
+    def stable(self, uniform):
+        q = gm.quality(*uniform)
+        return [array[q > 0.01][:2000] for array in uniform]
+
+    def test_order_of_contacts(self, stable):
+        contacts, normals, centers = stable
+        q = gm.quality(contacts, normals, centers)
+        for order in ([1, 0, 2], [2, 1, 0], [1, 2, 0]):
+            permuted = gm.quality(contacts[:, order], normals[:, order], centers)
+            np.testing.assert_allclose(permuted, q, rtol=1e-11)
+
+    def test_translation(self, stable):
+        contacts, normals, centers = stable
+        shift = np.array([3.0, -2.0, 5.0])
+        q = gm.quality(contacts, normals, centers)
+        moved = gm.quality(contacts + shift, normals, centers + shift)
+        np.testing.assert_allclose(moved, q, rtol=1e-11)
+
+    def test_turns_that_map_the_cones_to_themselves(self, stable):
+        contacts, normals, centers = stable
+        q = gm.quality(contacts, normals, centers)
+        turn = rotation_about_z(3 * 2 * np.pi / 8).T
+        turned = gm.quality(contacts @ turn, normals @ turn, centers @ turn)
+        np.testing.assert_allclose(turned, q, rtol=1e-11)
+
+    def test_any_rotation_changes_finely_polygonal_cones_little(self, stable):
+        contacts, normals, centers = (array[:50] for array in stable)
+        axis = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+        axis *= np.linalg.det(axis)
+        q = gm.quality(contacts, normals, centers, edges=64)
+        turned = gm.quality(contacts @ axis, normals @ axis, centers @ axis, edges=64)
+        # The polygon's sagitta: cos(π/64) is 1 − 1.2e-3.
+        np.testing.assert_allclose(turned, q, rtol=0.02, atol=1e-3)
+
+    def test_larger_friction_with_the_same_edges_never_hurts(self, stable):
+        values = [gm.quality(*stable, friction=mu) for mu in (0.3, 0.6, 1.0, 1.5)]
+        for lower, higher in itertools.pairwise(values):
+            assert (higher >= lower - 1e-12).all()
+
+    def test_change_is_bounded_by_the_largest_wrench_displacement(self, stable):
+        rng = np.random.default_rng(4)
+        contacts, normals, centers = (array[:300] for array in stable)
+        moved = contacts + 0.01 * rng.normal(size=contacts.shape)
+        q, other = gm.quality(contacts, normals, centers), gm.quality(moved, normals, centers)
+        for i in range(len(q)):
+            before = reference.wrenches(contacts[i], normals[i], centers[i])
+            after = reference.wrenches(moved[i], normals[i], centers[i])
+            assert abs(q[i] - other[i]) <= np.linalg.norm(before - after, axis=1).max() + 1e-12
+
+    def test_torque_is_not_rescaled(self):
+        # With the lever arms all torques vanish; the quality follows in proportion.
+        small = gm.quality(1e-6 * CIRCLE, -CIRCLE, ORIGIN)
+        smaller = gm.quality(1e-7 * CIRCLE, -CIRCLE, ORIGIN)
+        assert small / smaller == pytest.approx(10.0, rel=1e-6)
+
+
+class TestGradient:
+    def test_is_that_of_finite_differences(self, uniform):
+        q = gm.quality(*uniform)
+        contacts, normals, centers = (array[q > 0.02][:200] for array in uniform)
+        gradient = gm.quality_gradient(contacts, normals, centers)
+        np.testing.assert_array_equal(gradient.value, gm.quality(contacts, normals, centers))
+        rng = np.random.default_rng(5)
+        h = 1e-6
+        wrong = 0
+        for _ in range(5):
+            dc, dn, dz = (rng.normal(size=a.shape) for a in (contacts, normals, centers))
+
+            def at(step, dc=dc, dn=dn, dz=dz):
+                turned = normals + step * dn
+                turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+                return gm.quality(contacts + step * dc, turned, centers + step * dz)
+
+            difference = (at(h) - at(-h)) / (2 * h)
+            predicted = (
+                (gradient.contacts * dc).sum((1, 2))
+                + (gradient.normals * dn).sum((1, 2))
+                + (gradient.center_of_mass * dz).sum(1)
+            )
+            # A facet may change between the two sides: there Q has a kink.
+            kink = np.abs(at(h) + at(-h) - 2 * gradient.value) > 1e-9
+            wrong += (np.abs(difference - predicted) > 1e-6 * (1 + np.abs(predicted)))[~kink].sum()
+            assert kink.mean() < 0.02
+        assert wrong == 0
+
+    def test_normals_have_tangent_gradients_and_translations_none(self, uniform):
+        contacts, normals, centers = (array[:2000] for array in uniform)
+        gradient = gm.quality_gradient(contacts, normals, centers)
+        along = (gradient.normals * normals).sum(-1)
+        assert np.abs(along).max() < 1e-12
+        total = gradient.contacts.sum(1) + gradient.center_of_mass
+        assert np.abs(total).max() < 1e-12
+
+    def test_is_0_where_the_quality_is_0(self):
+        gradient = gm.quality_gradient(CIRCLE, [[0, 0, 1]] * 3, ORIGIN)
+        assert gradient.value == 0.0
+        assert not gradient.contacts.any()
+        assert not gradient.normals.any()
+
+    def test_two_contacts_have_the_shapes_of_two(self):
+        gradient = gm.quality_gradient(CIRCLE[:2], -CIRCLE[:2], ORIGIN)
+        assert gradient.contacts.shape == (2, 3)
+        assert gradient.center_of_mass.shape == (3,)
+
+    def test_results_cannot_be_changed(self):
+        gradient = gm.quality_gradient(CIRCLE, -CIRCLE, ORIGIN)
+        with pytest.raises(ValueError, match="read-only"):
+            gradient.contacts[0, 0] = 1.0
+
+
+class TestDegenerate:
+    def test_small_and_large_circles(self):
+        for radius in (1e-6, 1e-4, 1e4):
+            q = gm.quality(radius * CIRCLE, -CIRCLE, ORIGIN)
+            points = reference.wrenches(radius * CIRCLE, -CIRCLE, ORIGIN)
+            # Qhull works on wrenches with torques of the order of forces; the hull is an
+            # affine image, so compare facet by facet after scaling back.
+            from scipy.spatial import ConvexHull
+
+            scale = np.array([1, 1, 1, radius, radius, radius])
+            planes = ConvexHull(points / scale, qhull_options="Qt").equations
+            wanted = (-planes[:, -1] / np.linalg.norm(planes[:, :-1] / scale, axis=1)).min()
+            assert q == pytest.approx(wanted, rel=1e-9)
+
+    @pytest.mark.parametrize(
+        ("contacts", "normals"),
+        [
+            pytest.param([[1, 0, 0], [-1, 0, 0]], [[-1, 0, 0], [1, 0, 0]], id="two contacts"),
+            pytest.param([[1, 0, 0]], [[-1, 0, 0]], id="one contact"),
+            pytest.param(
+                [[1, 0, 0], [-1, 0, 0], [0, 0, 0]],
+                [[-1, 0, 0], [1, 0, 0], [0, 0, 1]],
+                id="collinear",
+            ),
+            pytest.param(
+                [[1, 0, 0], [-1, 0, 0], [-1, 0, 0]],
+                [[-1, 0, 0], [1, 0, 0], [1, 0, 0]],
+                id="antipodal with a duplicate",
+            ),
+            pytest.param([[1, 1, 1]] * 3, [[-1, 0, 0], [1, 0, 0], [0, 0, 1]], id="coincident"),
+            pytest.param(CIRCLE, [[0, 0, 1]] * 3, id="pushing one way"),
+        ],
+    )
+    def test_quality_is_exactly_0(self, contacts, normals):
+        assert gm.quality(contacts, normals, ORIGIN) == 0.0
+
+    def test_collinear_to_rounding_after_any_rotation(self):
+        rng = np.random.default_rng(6)
+        line = np.array([[1.0, 0, 0], [-1, 0, 0], [0.3, 0, 0]])
+        normals = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0.6, 0.8]])
+        for _ in range(200):
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            turn *= np.sign(np.linalg.det(turn))
+            shift = rng.normal(size=3)
+            assert gm.quality(line @ turn + shift, normals @ turn, shift) == 0.0
+
+    def test_nearly_collinear_is_nearly_0_and_right(self):
+        for height in (1e-3, 1e-6, 1e-9):
+            contacts = np.array([[1.0, 0, 0], [-1, 0, 0], [0.1, height, 0]])
+            normals = np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0]])
+            q = gm.quality(contacts, normals, ORIGIN)
+            assert 0.0 <= q <= 2 * height
+            assert q == pytest.approx(
+                max(reference.quality(contacts, normals, ORIGIN), 0), abs=1e-10
+            )
+
+    def test_a_normal_at_minus_e3(self):
+        contacts = np.array([[0, 0, 1.0], [0.5, 0, -1], [-0.5, 0.1, -1]])
+        normals = np.array([[0, 0, -1.0], [0, 0, 1], [0, 0, 1]])
+        q = gm.quality(contacts, normals, ORIGIN)
+        assert q > 0.1
+        assert q == pytest.approx(reference.quality(contacts, normals, ORIGIN), abs=1e-11)
+
+    def test_a_contact_at_the_centre_of_mass(self):
+        q = gm.quality(CIRCLE, -CIRCLE, CIRCLE[0])
+        assert q == pytest.approx(reference.quality(CIRCLE, -CIRCLE, CIRCLE[0]), abs=1e-11)
+
+    def test_symmetric_grasps_whose_facets_coincide(self):
+        # Grasps in a plane through an axis of revolution have many facets at the same distance.
+        rng = np.random.default_rng(7)
+        for _ in range(300):
+            z = rng.uniform(-1, 1, 3)
+            contacts = np.array([[1, 0, z[0]], [-1, 0, z[1]], [-1, 0, z[2]]])
+            q = gm.quality(contacts, PINCH_NORMALS, ORIGIN)
+            wanted = reference.quality(contacts, PINCH_NORMALS, ORIGIN)
+            assert q == pytest.approx(max(wanted, 0.0), abs=1e-10)
+
+
+class TestShapes:
+    def test_a_single_grasp_gives_a_float(self):
+        assert type(gm.quality(CIRCLE, -CIRCLE, ORIGIN)) is float
+
+    def test_batches_of_any_shape_broadcast_the_centre(self):
+        contacts = np.broadcast_to(CIRCLE, (2, 5, 3, 3))
+        assert gm.quality(contacts, -contacts, ORIGIN).shape == (2, 5)
+        assert gm.quality(contacts[:0], -contacts[:0], ORIGIN).shape == (0, 5)
+
+    def test_lists_strides_and_single_precision_work(self):
+        value = gm.quality(CIRCLE, -CIRCLE, ORIGIN)
+        assert gm.quality(CIRCLE.tolist(), (-CIRCLE).tolist(), [0, 0, 0]) == value
+        assert gm.quality(np.asfortranarray(CIRCLE), -CIRCLE, ORIGIN) == value
+        single = CIRCLE.astype(np.float32)
+        assert gm.quality(single, -single, ORIGIN) == pytest.approx(value, abs=1e-6)
+
+    def test_results_do_not_depend_on_the_batch(self, uniform):
+        q = gm.quality(*(array[:3000] for array in uniform))
+        alone = [gm.quality(*(array[i] for array in uniform)) for i in range(0, 3000, 10)]
+        np.testing.assert_array_equal(q[::10], alone)
+
+
+class TestWrongInput:
+    @pytest.mark.parametrize(
+        ("arguments", "options", "sentence"),
+        [
+            ((CIRCLE[:, :2], -CIRCLE, ORIGIN), {}, "contacts must have shape .* got \\(3, 2\\)"),
+            ((CIRCLE, -CIRCLE[:2], ORIGIN), {}, "normals must be as many per grasp as contacts"),
+            ((CIRCLE, -CIRCLE, [0, 0]), {}, "center_of_mass must have shape"),
+            (
+                (CIRCLE, -2 * CIRCLE, ORIGIN),
+                {},
+                "normals must be unit vectors, got one of length 2",
+            ),
+            ((CIRCLE * np.nan, -CIRCLE, ORIGIN), {}, "contacts must be finite, got nan at index"),
+            ((CIRCLE, -CIRCLE, [0, np.inf, 0]), {}, "center_of_mass must be finite, got inf"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"friction": 0.0}, "friction must be a positive"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"friction": -1}, "friction must be .* got -1"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"friction": "rough"}, "friction must be .* got 'rough'"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"edges": 2}, "edges must be at least 3, got 2"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"edges": 8.5}, "edges must be a whole number"),
+            (("here", -CIRCLE, ORIGIN), {}, "contacts must be an array of numbers, got 'here'"),
+            ((np.ones((4, 3)), np.ones((4, 3)) / 3**0.5, ORIGIN), {}, "contacts must be at most 3"),
+            ((CIRCLE[:0], CIRCLE[:0], ORIGIN), {}, "contacts must be at least one"),
+            (
+                (np.stack([CIRCLE] * 2), -CIRCLE, np.zeros((3, 3))),
+                {},
+                "must have batch shapes that broadcast",
+            ),
+        ],
+    )
+    def test_one_sentence_says_what_was_wanted(self, arguments, options, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence) as caught:
+            gm.quality(*arguments, **options)
+        assert "\n" not in str(caught.value)
+        assert isinstance(caught.value, ValueError)

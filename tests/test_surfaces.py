@@ -1,0 +1,234 @@
+"""Surfaces: the definition, derivatives, integrals, the convex cone, files, wrong input."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+import graspmoduli as gm
+
+TAU = 2 * np.pi
+
+
+def wavy(u, theta):
+    return 0.5 + 0.1 * np.sin(3 * u) + 0.08 * np.cos(2 * theta + u) + 0.05 * np.sin(theta) * u
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return gm.Surface.from_function(wavy, -0.3, 0.9)
+
+
+@pytest.fixture(scope="module")
+def coordinates():
+    rng = np.random.default_rng(0)
+    return rng.random(300), TAU * rng.random(300)
+
+
+def test_a_function_is_met_to_the_tolerance(surface, coordinates):
+    u, theta = coordinates
+    assert np.abs(surface.radius(u, theta) - wavy(u, theta)).max() < 1e-6
+    finer = gm.Surface.from_function(wavy, -0.3, 0.9, tolerance=1e-9)
+    assert np.abs(finer.radius(u, theta) - wavy(u, theta)).max() < 1e-9
+
+
+def test_points_are_those_of_the_definition(surface, coordinates):
+    u, theta = coordinates
+    f = surface.radius(u, theta)
+    wanted = np.stack([f * np.cos(theta), f * np.sin(theta), -0.3 * (1 - u) + 0.9 * u], axis=1)
+    np.testing.assert_allclose(surface.points(u, theta), wanted, atol=1e-15)
+
+
+def test_the_radius_is_the_tensor_product_of_textbook_splines():
+    rng = np.random.default_rng(1)
+    coefficients = 0.5 + 0.2 * rng.random((9, 7))
+    surface = gm.Surface.from_coefficients(coefficients, 0.0, 1.0)
+    knots = np.concatenate([[0] * 3, np.linspace(0, 1, 7), [1] * 3])
+    wrapped = np.concatenate([coefficients, coefficients[:, :3]], axis=1)
+    for u in (0.0, 0.12, 0.5, 0.93, 1.0):
+        row = BSpline(knots, wrapped, 3)(u)
+        for theta in (0.0, 1.3, 4.0, 6.28):
+            wanted = BSpline(np.arange(-3.0, 11.0), row, 3)(theta / TAU * 7)
+            assert surface.radius(u, theta) == pytest.approx(wanted, abs=1e-14)
+
+
+def test_normals_point_inward_and_are_unit(surface, coordinates):
+    u, theta = coordinates
+    n, p = surface.normals(u, theta), surface.points(u, theta)
+    np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, atol=1e-14)
+    assert ((n[:, :2] * p[:, :2]).sum(1) < 0).all()
+    t1, t2 = surface.tangents(u, theta)
+    cross = np.cross(t1, t2)
+    np.testing.assert_allclose(n, cross / np.linalg.norm(cross, axis=1)[:, None], atol=1e-13)
+
+
+def test_derivatives_are_those_of_finite_differences(surface, coordinates):
+    u, theta = coordinates
+    u = 0.01 + 0.98 * u
+    h = 1e-6
+
+    def slopes(values):
+        return (
+            (values(u + h, theta) - values(u - h, theta)) / (2 * h),
+            (values(u, theta + h) - values(u, theta - h)) / (2 * h),
+        )
+
+    for got, wanted in zip(surface.tangents(u, theta), slopes(surface.points), strict=True):
+        np.testing.assert_allclose(got, wanted, atol=1e-8)
+    for got, wanted in zip(
+        surface.normal_derivatives(u, theta), slopes(surface.normals), strict=True
+    ):
+        np.testing.assert_allclose(got, wanted, atol=1e-6)
+    second = surface.second_derivatives(u, theta)
+    for axis, (along_u, along_theta) in enumerate(
+        [(second.uu, second.u_theta), (second.u_theta, second.theta_theta)]
+    ):
+        got = slopes(lambda a, b, axis=axis: surface.tangents(a, b)[axis])
+        np.testing.assert_allclose(along_u, got[0], atol=1e-6)
+        np.testing.assert_allclose(along_theta, got[1], atol=1e-6)
+
+
+def test_integrals_of_a_cone_are_in_closed_form():
+    # Frustum of radii 0.5 and 0.2, height 1.
+    frustum = gm.Surface.from_function(lambda u, theta: 0.5 - 0.3 * u, 0.0, 1.0)
+    slant = np.hypot(0.3, 1.0)
+    assert frustum.area == pytest.approx(np.pi * 0.7 * slant, rel=1e-12)
+    assert frustum.volume == pytest.approx(np.pi / 3 * (0.25 + 0.1 + 0.04), rel=1e-12)
+    np.testing.assert_allclose(
+        frustum.center_of_mass, [0, 0, (0.5 + 2 * 0.2) / 3 / 0.7], atol=1e-12
+    )
+    solid = (0.25 + 2 * 0.1 + 3 * 0.04) / 4 / (0.25 + 0.1 + 0.04)
+    np.testing.assert_allclose(frustum.solid_center_of_mass, [0, 0, solid], atol=1e-12)
+
+
+def test_integrals_agree_with_a_fine_sum(surface):
+    n = 1500
+    u, theta = np.meshgrid((np.arange(n) + 0.5) / n, TAU * (np.arange(n) + 0.5) / n, indexing="ij")
+    u, theta = u.ravel(), theta.ravel()
+    area = np.linalg.norm(np.cross(*surface.tangents(u, theta)), axis=1) * TAU / n**2
+    assert surface.area == pytest.approx(area.sum(), rel=1e-6)
+    center = (surface.points(u, theta) * area[:, None]).sum(0) / area.sum()
+    np.testing.assert_allclose(surface.center_of_mass, center, atol=1e-6)
+    np.testing.assert_allclose(surface.center_of_mass_by_simpson(60), center, atol=1e-5)
+
+
+class TestConvexCone:
+    def test_sums_are_exact_whatever_the_grids(self, surface, coordinates):
+        u, theta = coordinates
+        other = gm.Surface.from_coefficients(
+            0.3 + 0.1 * np.random.default_rng(2).random((8, 6)), -1.0, 0.5
+        )
+        total = 2.0 * surface + other * 0.5
+        wanted = 2.0 * surface.radius(u, theta) + 0.5 * other.radius(u, theta)
+        np.testing.assert_allclose(total.radius(u, theta), wanted, atol=1e-14)
+        assert total.bottom == pytest.approx(2 * -0.3 - 0.5)
+        assert total.top == pytest.approx(2 * 0.9 + 0.25)
+
+    def test_combinations_stay_in_the_convex_hull(self, surface):
+        other = gm.shapes.MODELS["b"]
+        mixed = gm.combine([surface, other], [0.25, 0.75])
+        assert mixed.radius(0.3, 1.0) == pytest.approx(
+            0.25 * surface.radius(0.3, 1.0) + 0.75 * other.radius(0.3, 1.0), abs=1e-14
+        )
+        alone = gm.combine([surface, other], [1.0, 0.0])
+        assert alone.radius(0.3, 1.0) == pytest.approx(surface.radius(0.3, 1.0), abs=1e-15)
+
+    def test_projection_is_the_mean_over_theta_and_idempotent(self, surface):
+        projected = gm.project(surface)
+        theta = TAU * np.arange(1024) / 1024
+        for u in (0.0, 0.4, 1.0):
+            mean = surface.radius(u, theta).mean()
+            assert projected.radius(u, 2.0) == pytest.approx(mean, abs=1e-13)
+        again = gm.project(projected)
+        np.testing.assert_allclose(again.coefficients, projected.coefficients, rtol=1e-15)
+
+    @pytest.mark.parametrize(
+        ("weights", "sentence"),
+        [
+            ([0.5, 0.6], "weights must sum to 1, got 1.1"),
+            ([1.5, -0.5], "weights must not be negative, got -0.5"),
+            ([1.0], "weights must be one per surface"),
+        ],
+    )
+    def test_wrong_weights(self, surface, weights, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.combine([surface, surface], weights)
+
+    def test_factors_are_positive(self, surface):
+        with pytest.raises(gm.GraspModuliError, match="factor must be a positive"):
+            _ = 0.0 * surface
+
+
+def test_saving_and_loading_keeps_every_bit(surface, tmp_path):
+    path = tmp_path / "surface.npz"
+    surface.save(path)
+    loaded = gm.Surface.load(path)
+    np.testing.assert_array_equal(loaded.coefficients, surface.coefficients)
+    assert (loaded.bottom, loaded.top) == (surface.bottom, surface.top)
+    assert [p.name for p in tmp_path.iterdir()] == ["surface.npz"]
+
+
+def test_loading_something_else_is_refused(tmp_path):
+    path = tmp_path / "no.npz"
+    with pytest.raises(gm.GraspModuliError, match="got no file"):
+        gm.Surface.load(path)
+    path.write_text("hello")
+    with pytest.raises(gm.GraspModuliError, match=r"written by Surface\.save"):
+        gm.Surface.load(path)
+
+
+def test_a_function_that_is_not_smooth_is_said_so():
+    with pytest.warns(UserWarning, match="not smooth enough"):
+        gm.Surface.from_function(lambda u, t: 1.0 + (u > 0.31), 0, 1, tolerance=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: gm.Surface.from_function(wavy, 1.0, 0.0), "bottom must be below top"),
+        (
+            lambda: gm.Surface.from_function(lambda u, t: u - 0.5, 0.0, 1.0),
+            "radius must be positive and finite, got -0.5 at u = 0, theta = 0",
+        ),
+        (
+            lambda: gm.Surface.from_function(lambda u, t: np.ones(3), 0.0, 1.0),
+            "radius must return one value per",
+        ),
+        (
+            lambda: gm.Surface.from_coefficients(np.ones((3, 8)), 0.0, 1.0),
+            "coefficients must have shape",
+        ),
+        (
+            lambda: gm.Surface.from_coefficients(np.eye(4), 0.0, 1.0),
+            "coefficients must be positive",
+        ),
+        (lambda: gm.Surface.from_coefficients(np.ones(9), 0.0, 1.0), "must have shape"),
+        (lambda: gm.shapes.model("teapot"), "name must be one of a \\(bottle\\)"),
+    ],
+)
+def test_wrong_input(call, sentence):
+    with pytest.raises(gm.GraspModuliError, match=sentence):
+        call()
+
+
+def test_coordinates_outside_are_refused(surface):
+    with pytest.raises(gm.GraspModuliError, match=r"u must lie in \[0, 1\], got 1.5"):
+        surface.points(1.5, 0.0)
+    with pytest.raises(gm.GraspModuliError, match="shapes that broadcast"):
+        surface.points([0.1, 0.2], [1.0, 2.0, 3.0])
+
+
+class TestModels:
+    def test_there_are_twelve_within_the_unit_ball(self):
+        assert list(gm.shapes.MODELS) == list("abcdefghijkl")
+        for surface in gm.shapes.MODELS.values():
+            assert surface.radius_about([0, 0, 0]) < 1.0
+
+    def test_four_are_of_revolution_and_eight_are_not(self):
+        theta = np.linspace(0, TAU, 100)
+        for name, surface in gm.shapes.MODELS.items():
+            spread = max(np.ptp(surface.radius(u, theta)) for u in np.linspace(0, 1, 21))
+            assert (spread < 1e-12) == (name in "abcd")
+
+    def test_an_unknown_name_lists_the_known_ones(self):
+        with pytest.raises(KeyError, match="a, b, c"):
+            _ = gm.shapes.MODELS["z"]

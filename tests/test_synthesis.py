@@ -1,0 +1,196 @@
+"""Grasps, exhaustive search and synthesis."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import graspmoduli as gm
+import reference
+
+NOT_ROUND = "efghijkl"
+
+
+def exhaustive(surface, u, theta, **options):
+    """Every subset's quality: the slow twin of best_grasps."""
+    index = np.array(list(itertools.combinations(range(len(u)), 3)))
+    points, normals = surface.points(u, theta), surface.normals(u, theta)
+    return index, gm.quality(points[index], normals[index], surface.center_of_mass, **options)
+
+
+class TestGrasp:
+    def test_angles_are_kept_in_one_turn_and_arrays_locked(self):
+        grasp = gm.Grasp([0.1, 0.2, 0.3], [-1.0, 7.0, 0.0])
+        assert ((grasp.theta >= 0) & (grasp.theta < 2 * np.pi)).all()
+        with pytest.raises(ValueError, match="read-only"):
+            grasp.u[0] = 0.5
+        with pytest.raises(AttributeError, match="does not change"):
+            grasp.u = grasp.theta
+
+    def test_equal_grasps_are_equal(self):
+        assert gm.Grasp([0.1], [1.0]) == gm.Grasp([0.1], [1.0])
+        assert hash(gm.Grasp([0.1], [1.0])) == hash(gm.Grasp([0.1], [1.0]))
+        assert gm.Grasp([0.1], [1.0]) != gm.Grasp([0.2], [1.0])
+
+    def test_placing_gives_contacts_on_the_surface(self):
+        surface = gm.shapes.MODELS["g"]
+        grasp = gm.Grasp([0.2, 0.5, 0.8], [0.0, 2.0, 4.0])
+        placed = gm.place(surface, grasp)
+        np.testing.assert_array_equal(placed.contacts, surface.points(grasp.u, grasp.theta))
+        np.testing.assert_array_equal(placed.normals, surface.normals(grasp.u, grasp.theta))
+        np.testing.assert_array_equal(placed.center_of_mass, surface.center_of_mass)
+        assert placed.quality() == gm.quality(
+            placed.contacts, placed.normals, placed.center_of_mass
+        )
+
+    @pytest.mark.parametrize(
+        ("u", "theta", "sentence"),
+        [
+            ([0.1, 1.2], [0, 0], r"u must lie in \[0, 1\]"),
+            ([0.1], [0, 0], "must have the same shape"),
+            ([], [], "must have the same shape"),
+            ([0.1], [np.nan], "theta must be finite"),
+        ],
+    )
+    def test_wrong_input(self, u, theta, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.Grasp(u, theta)
+
+
+class TestSearch:
+    @pytest.mark.parametrize("name", ["a", "f", "j", "k"])
+    def test_equals_evaluating_every_subset(self, name):
+        surface = gm.shapes.MODELS[name]
+        u, theta = gm.sample_points(surface, 40, seed=2)
+        index, q = exhaustive(surface, u, theta)
+        best = gm.best_grasps(surface, u, theta, top=20)
+        np.testing.assert_array_equal([b.quality for b in best], np.sort(q)[::-1][:20])
+        for ranked, chosen in zip(best, index[np.argsort(-q, kind="stable")], strict=False):
+            np.testing.assert_array_equal(ranked.grasp.u, u[chosen])
+
+    def test_other_friction_and_edges(self):
+        surface = gm.shapes.MODELS["h"]
+        u, theta = gm.sample_points(surface, 30, seed=4)
+        options = {"friction": 0.4, "edges": 5}
+        _, q = exhaustive(surface, u, theta, **options)
+        best = gm.best_grasps(surface, u, theta, top=5, **options)
+        wanted = np.sort(q)[::-1][:5]
+        np.testing.assert_array_equal([b.quality for b in best], wanted[wanted > 0])
+
+    def test_the_number_of_threads_changes_nothing(self):
+        surface = gm.shapes.MODELS["e"]
+        u, theta = gm.sample_points(surface, 90, seed=8)
+        results = [gm.best_grasps(surface, u, theta, top=50, threads=t) for t in (1, 2, 4, 7)]
+        assert all(result == results[0] for result in results)
+
+    def test_only_force_closure_grasps_are_ranked(self):
+        surface = gm.shapes.MODELS["a"]
+        assert gm.best_grasps(surface, [0.1, 0.2, 0.3], [0.0, 0.0, 0.01], top=3) == []
+
+    def test_progress_reaches_the_end_and_can_stop_the_search(self):
+        surface = gm.shapes.MODELS["a"]
+        u, theta = gm.sample_points(surface, 120)
+        calls = []
+        gm.best_grasps(surface, u, theta, progress=lambda done, total: calls.append((done, total)))
+        assert calls[-1][0] <= calls[-1][1] == 120 * 119 * 118 // 6
+
+        def stop(done, total):
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            gm.best_grasps(surface, u, theta, progress=stop)
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"contacts": 4}, "contacts must be 3 in this version, got 4"),
+            ({"top": 0}, "top must be at least 1"),
+            ({"threads": 0}, "threads must be at least 1"),
+            ({"friction": 0}, "friction must be a positive"),
+            ({"center_of_mass": [0, 0]}, "center_of_mass must have shape"),
+        ],
+    )
+    def test_wrong_input(self, options, sentence):
+        surface = gm.shapes.MODELS["a"]
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.best_grasps(surface, [0.1, 0.5, 0.9], [0, 2, 4], **options)
+        with pytest.raises(gm.GraspModuliError, match="at least 3 contacts, got 2"):
+            gm.best_grasps(surface, [0.1, 0.5], [0, 2])
+
+
+class TestSynthesis:
+    @pytest.mark.parametrize("name", NOT_ROUND)
+    def test_is_at_least_as_good_as_the_best_of_50_samples(self, name):
+        surface = gm.shapes.MODELS[name]
+        best = gm.best_grasps(surface, *gm.sample_points(surface, 50, seed=1))[0]
+        assert gm.synthesize(surface)[0].quality >= best.quality
+
+    @pytest.mark.parametrize("name", gm.shapes.MODELS)
+    def test_grasps_are_ranked_different_and_have_the_stated_quality(self, name):
+        surface = gm.shapes.MODELS[name]
+        grasps = gm.synthesize(surface, top=4)
+        values = [g.quality for g in grasps]
+        assert values == sorted(values, reverse=True)
+        assert len(grasps) >= 2
+        points = []
+        for ranked in grasps:
+            placed = gm.place(surface, ranked.grasp)
+            assert placed.quality() == pytest.approx(ranked.quality, rel=1e-12)
+            twin = reference.quality(placed.contacts, placed.normals, placed.center_of_mass)
+            assert ranked.quality == pytest.approx(twin, abs=1e-9)
+            points.append(placed.contacts)
+        for one, other in itertools.combinations(points, 2):
+            apart = min(
+                np.linalg.norm(one - other[list(order)], axis=1).max()
+                for order in itertools.permutations(range(3))
+            )
+            assert apart > 0.15 * surface.radius_about(surface.center_of_mass) - 1e-9
+
+    @pytest.mark.parametrize("name", ["e", "j", "l"])
+    def test_the_best_is_a_local_maximum(self, name):
+        surface = gm.shapes.MODELS[name]
+        best = gm.synthesize(surface, top=1)[0]
+        rng = np.random.default_rng(0)
+        steps = rng.normal(size=(3000, 2, 3)) * 10.0 ** rng.uniform(-4, -2, (3000, 1, 1))
+        u = np.clip(best.grasp.u + steps[:, 0], 0, 1)
+        theta = best.grasp.theta + steps[:, 1]
+        q = gm.quality(surface.points(u, theta), surface.normals(u, theta), surface.center_of_mass)
+        assert q.max() <= best.quality * 1.003
+
+    def test_same_seed_same_bits(self):
+        surface = gm.shapes.MODELS["i"]
+        assert gm.synthesize(surface, seed=3) == gm.synthesize(surface, seed=3)
+
+    def test_contacts_stay_where_they_are_allowed(self):
+        surface = gm.shapes.MODELS["b"]
+        allowed = np.zeros((20, 36), bool)
+        allowed[4:16, :] = True
+        allowed[:, 10:15] = False
+        grasps = gm.synthesize(surface, allowed=allowed)
+        assert grasps
+        for ranked in grasps:
+            row = (ranked.grasp.u * 20).astype(int)
+            column = (ranked.grasp.theta / (2 * np.pi) * 36).astype(int)
+            assert allowed[row, column].all()
+
+    def test_nowhere_allowed_gives_no_grasp(self):
+        assert gm.synthesize(gm.shapes.MODELS["b"], allowed=np.zeros((4, 4), bool)) == []
+
+    def test_another_centre_of_mass(self):
+        surface = gm.shapes.MODELS["a"]
+        center = surface.solid_center_of_mass
+        best = gm.synthesize(surface, center_of_mass=center)[0]
+        placed = gm.place(surface, best.grasp)
+        value = gm.quality(placed.contacts, placed.normals, center)
+        assert value == pytest.approx(best.quality, rel=1e-12)
+
+    def test_little_friction_finds_fewer_grasps_without_failing(self):
+        for friction in (0.05, 0.2):
+            for ranked in gm.synthesize(gm.shapes.MODELS["e"], friction=friction):
+                assert ranked.quality > 0
+
+    def test_wrong_input(self):
+        with pytest.raises(gm.GraspModuliError, match="allowed must have shape"):
+            gm.synthesize(gm.shapes.MODELS["a"], allowed=[True])
+        with pytest.raises(gm.GraspModuliError, match="top must be at least 1"):
+            gm.synthesize(gm.shapes.MODELS["a"], top=0)
