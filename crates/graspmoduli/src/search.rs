@@ -36,8 +36,8 @@ pub struct Ranked {
 /// The `top` best force-closure grasps among all triples of `contacts`, best first, equal ones by
 /// their indices; fewer if there are fewer. The result does not depend on `threads`.
 ///
-/// `progress(done, total)` is called now and then from the calling thread, in triples, and may ask
-/// to stop: then the answer is [`Error::Interrupted`].
+/// `progress(done, total)` is called now and then and at the end from the calling thread, in
+/// triples, and may ask to stop: then the answer is [`Error::Interrupted`].
 pub fn best_triples(
     contacts: &[Contact],
     center_of_mass: DVec3,
@@ -71,9 +71,15 @@ pub fn best_triples(
         *running.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
         finished.notify_one();
     };
+    let mut report = || {
+        if progress(done.load(Ordering::Relaxed), total).is_break() {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
     // A short search is over before threads have started.
     if threads <= 1 && total < 100_000 {
         work(first);
+        report();
     } else {
         std::thread::scope(|scope| {
             for _ in 1..threads.max(1) {
@@ -82,12 +88,15 @@ pub fn best_triples(
             }
             scope.spawn(|| work(first));
             let mut left = running.lock().unwrap_or_else(PoisonError::into_inner);
-            while *left > 0 {
-                left = finished
-                    .wait_timeout(left, TICK)
-                    .map_or_else(|poisoned| poisoned.into_inner().0, |(guard, _)| guard);
-                if progress(done.load(Ordering::Relaxed), total).is_break() {
-                    stop.store(true, Ordering::Relaxed);
+            loop {
+                if *left > 0 {
+                    left = finished
+                        .wait_timeout(left, TICK)
+                        .map_or_else(|poisoned| poisoned.into_inner().0, |(guard, _)| guard);
+                }
+                report();
+                if *left == 0 {
+                    break;
                 }
             }
         });
