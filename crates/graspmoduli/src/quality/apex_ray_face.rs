@@ -1,40 +1,72 @@
 //! Vertices of P with one velocity at the apex of its cone, one on a ray and one on a face.
 
 use super::Twist;
-use super::lanes::{Lane, dot, load, splat_each, vectors_mut};
-use super::plane::{LANES, Lanes};
-use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, TINY, at, ray};
-use super::velocity::Velocity;
+use super::lanes::{Lane, Number, dot, load, splat_each, store};
+use super::plane::{LANES, Lanes, Plane, at};
+use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, ray};
 use glam::DVec2;
 use pulp::Simd;
 use std::ops::ControlFlow;
 
-/// What is left to move when the velocities of two contacts are held; see [`Kernel::hold`].
-struct Held {
-    apex: usize,
-    ray: (usize, usize),
-    face: usize,
-    /// Planar velocity of the third contact, less its normal.
-    offset: DVec2,
-    /// The twist with the third contact's normal as its velocity out of the plane, and the one
-    /// that lifts it.
-    base: Twist,
-    lift: Twist,
+/// Which contact is at the apex, which on a ray, which on a face.
+const ROLES: [[usize; 3]; 6] = [
+    [0, 1, 2],
+    [1, 0, 2],
+    [0, 2, 1],
+    [2, 0, 1],
+    [1, 2, 0],
+    [2, 1, 0],
+];
+/// Edges this parallel to the plane (as a share of their length) bound no height.
+pub(super) const LEVEL: f64 = 1e-12;
+
+/// Edges of one contact as bounds on the height h of y − n over its planar part w: from above or
+/// below, h = ⟨slope, w⟩.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Bounds {
+    above: Vec<(DVec2, usize)>,
+    below: Vec<(DVec2, usize)>,
 }
 
-/// [`Held`] for all rays of a contact: whether ρ ≥ 0, the offset, ‖base‖² and 2⟨base, lift⟩.
-#[derive(Debug, Clone, Default)]
-struct Holds {
-    sign: Lanes,
-    offset: [Lanes; 2],
-    square: Lanes,
-    mixed: Lanes,
+impl Bounds {
+    pub fn new(edges: usize) -> Self {
+        Self {
+            above: Vec::with_capacity(edges),
+            below: Vec::with_capacity(edges),
+        }
+    }
+}
+
+/// Fills the bounds of each contact: ⟨f, (w, h)⟩ ≤ 0 solved for h.
+#[inline(always)]
+fn set_bounds(plane: &Plane, bounds: &mut [Bounds; 3]) {
+    for (side, bounds) in plane.sides.iter().zip(bounds) {
+        bounds.above.clear();
+        bounds.below.clear();
+        for j in 0..plane.edges {
+            let [x, y, z] = at(&side.edge, j);
+            let slope = DVec2::new(x, y) * (-1.0 / z);
+            if z > LEVEL {
+                bounds.above.push((slope, j));
+            } else if z < -LEVEL {
+                bounds.below.push((slope, j));
+            }
+        }
+    }
+}
+
+/// The motions that are left when y of one contact is at the apex and that of another on a ray.
+struct Held {
+    /// Planar velocity of the third contact, less its normal.
+    offset: DVec2,
+    /// The twist with the third contact's normal as its velocity out of the plane.
+    base: Twist,
 }
 
 impl Kernel {
     /// apex–ray–face: y_i = n_i, y_k = n_k + ρ ray_kj with ρ from the rigidity of the pair; these
-    /// two fix the planar velocity of contact m, and y_m − n_m = α ray_mj' + β ray_m,j'+1 follows
-    /// from its two planar components; a lane per face of contact m.
+    /// two fix the planar velocity w of contact m. Over w the polar cone of m is an interval of
+    /// heights, and its ends are the vertices. A lane per ray of contact k.
     #[inline(always)]
     pub(super) fn apexes<S: Simd>(
         &mut self,
@@ -42,93 +74,62 @@ impl Kernel {
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let edges = self.plane.edges;
-        let blocks = edges.div_ceil(LANES);
-        let slack = Lane::splat(simd, -SLACK);
-        let velocity = Velocity::new(&self.plane);
-        let mut holds = Holds::default();
-        for face in 0..3 {
-            let lift = velocity.lift(face);
-            let lift_squared = Lane::splat(simd, dot(&lift, &lift));
-            let (left, right) = ((face + 1) % 3, (face + 2) % 3);
-            for (apex, other) in [(left, right), (right, left)] {
-                for held_block in 0..blocks {
-                    self.hold_all(simd, &mut holds, [apex, other, face], held_block);
-                    for lane in 0..LANES.min(edges - held_block * LANES) {
-                        // A ray at right angles to the side gives infinities, which `offer`
-                        // refuses.
-                        if holds.sign[lane] < -SLACK {
-                            continue;
-                        }
-                        let wx = Lane::splat(simd, holds.offset[0][lane]);
-                        let wy = Lane::splat(simd, holds.offset[1][lane]);
-                        let mixed = Lane::splat(simd, holds.mixed[lane]);
-                        for block in 0..blocks {
-                            let bar = *limit * (1.0 - TIE);
-                            let square = Lane::splat(simd, holds.square[lane] - bar);
-                            let tiny = Lane::splat(simd, TINY * bar);
-                            let mut any = false;
-                            for v in 0..LANES / S::F64_LANES {
-                                let [x, y, z] = load(simd, &self.plane.sides[face].ray, block, v);
-                                let [next_x, next_y, next_z, scale] =
-                                    load(simd, &self.faces[face], block, v);
-                                let alpha = wx * next_y - wy * next_x;
-                                let beta = wy * x - wx * y;
-                                let rise = alpha * z + beta * next_z;
-                                let worst = alpha.signed_by(scale).min(beta.signed_by(scale));
-                                let excess = (square * scale + mixed * rise) * scale
-                                    + lift_squared * rise * rise
-                                    - tiny;
-                                any |= worst.any_at_least(slack, excess);
-                            }
-                            if any {
-                                let ray = (other, held_block * LANES + lane);
-                                let held = self.hold(apex, ray, face);
-                                self.offer_faces(&held, block, question, limit)?;
-                            }
-                        }
-                    }
-                }
+        set_bounds(&self.plane, &mut self.bounds);
+        let blocks = self.plane.edges.div_ceil(LANES);
+        for (roles, index) in ROLES.into_iter().zip(0..) {
+            for block in 0..blocks {
+                let row = 2 * (index * blocks + block);
+                self.heights(simd, roles, block, row);
             }
         }
-        ControlFlow::Continue(())
-    }
-
-    /// Fills `faces`: of each contact, rays j + 1 and their cross products with rays j.
-    #[inline(always)]
-    pub(super) fn project_faces(&mut self) {
-        let edges = self.plane.edges;
-        for (side, faces) in self.plane.sides.iter().zip(&mut self.faces) {
-            for j in 0..edges {
-                let (block, lane) = (j / LANES, j % LANES);
-                for axis in 0..3 {
-                    faces[axis][block][lane] = at(&side.ray[axis], (j + 1) % edges);
-                }
+        // The longest first: it leaves little to do for the others.
+        loop {
+            let longest = self.longest_square(simd);
+            if longest <= *limit * (1.0 - TIE) {
+                return ControlFlow::Continue(());
             }
-            let [next_x, next_y, _, cross] = faces;
-            for block in 0..cross.len() {
-                let (x, y) = (&side.ray[0][block], &side.ray[1][block]);
-                for lane in 0..LANES {
-                    cross[block][lane] =
-                        x[lane] * next_y[block][lane] - y[lane] * next_x[block][lane];
-                }
-            }
+            let found = self.squares.iter().enumerate().find_map(|(row, squares)| {
+                let lane = squares.iter().position(|&square| square == longest)?;
+                Some((row, lane))
+            });
+            let Some((row, lane)) = found else {
+                return ControlFlow::Continue(());
+            };
+            self.squares[row][lane] = 0.0;
+            let roles = ROLES[row / (2 * blocks)];
+            let j = row / 2 % blocks * LANES + lane;
+            self.offer_end(roles, j, row % 2 == 0, question, limit)?;
         }
     }
 
-    /// [`Kernel::hold`] for a block of rays of contact `other`.
+    /// The greatest of `squares`.
     #[inline(always)]
-    fn hold_all<S: Simd>(
-        &self,
+    fn longest_square<S: Simd>(&self, simd: S) -> f64 {
+        let mut greatest = [Lanes::default()];
+        for v in 0..LANES / S::F64_LANES {
+            let mut longest = Lane::splat(simd, 0.0);
+            for row in &self.squares {
+                let [squares] = load(simd, std::array::from_ref(row), v);
+                longest = longest.max(squares);
+            }
+            store::<S, 1>(&mut greatest, v, [longest]);
+        }
+        let [a, b, c, d, e, f, g, h] = greatest[0].0;
+        a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
+    }
+
+    /// ‖x‖² at the ends of the interval of heights above each ray of a block: two rows of
+    /// `squares`, zero where there is no such vertex.
+    #[inline(always)]
+    fn heights<S: Simd>(
+        &mut self,
         simd: S,
-        holds: &mut Holds,
         [apex, other, face]: [usize; 3],
         block: usize,
+        row: usize,
     ) {
         let sides = &self.plane.sides;
-        let offset = sides[other].point - sides[apex].point;
-        let distance = offset.length();
-        let along = offset / distance;
+        let (along, distance) = self.plane.way(apex, other);
         let fixed = sides[apex].normal.truncate();
         let gap = Lane::splat(simd, along.dot(fixed - sides[other].normal.truncate()));
         let lever = sides[face].point - sides[apex].point;
@@ -140,12 +141,16 @@ impl Kernel {
         let [lx, ly] = splat_each(simd, lever.to_array());
         let [rest_x, rest_y] = splat_each(simd, rest.to_array());
         let normal = splat_each(simd, sides[other].normal.to_array());
-        let velocity = Velocity::new(&self.plane);
-        let lift = splat_each(simd, velocity.lift(face));
+        let velocity = self.plane.velocity;
+        let lift = velocity.lift(face);
+        let lift_squared = Lane::splat(simd, dot(&lift, &lift));
+        let lift = splat_each(simd, lift);
         let velocity = velocity.splat(simd);
+        let slack = Lane::splat(simd, -SLACK);
+        let zero = Lane::splat(simd, 0.0);
         let two = Lane::splat(simd, 2.0);
         for v in 0..LANES / S::F64_LANES {
-            let [x, y, z] = load(simd, &sides[other].ray, block, v);
+            let [x, y, z] = load(simd, &sides[other].ray[block], v);
             let slope = ax * x + ay * y;
             let rho = gap / slope;
             let moved_z = normal[2] + z * rho;
@@ -157,26 +162,42 @@ impl Kernel {
             ];
             heights[other] = moved_z;
             let base = velocity.rigid([fx + py * spin, fy - px * spin], spin, heights);
-            let rows = [
-                (&mut holds.sign, gap * slope),
-                (&mut holds.square, dot(&base, &base)),
-                (&mut holds.mixed, two * dot(&base, &lift)),
-            ];
-            for (row, value) in rows {
-                vectors_mut::<S>(row)[v] = value.value;
+            let (wx, wy) = (rest_x - ly * spin, rest_y + lx * spin);
+            let bounds = &self.bounds[face];
+            let mut top = Lane::splat(simd, f64::MAX);
+            for (slope, _) in &bounds.above {
+                let [sx, sy] = splat_each(simd, slope.to_array());
+                top = top.min(sx.mul_add(wx, sy * wy));
             }
-            vectors_mut::<S>(&mut holds.offset[0])[v] = (rest_x - ly * spin).value;
-            vectors_mut::<S>(&mut holds.offset[1])[v] = (rest_y + lx * spin).value;
+            let mut bottom = Lane::splat(simd, f64::MIN);
+            for (slope, _) in &bounds.below {
+                let [sx, sy] = splat_each(simd, slope.to_array());
+                bottom = bottom.max(sx.mul_add(wx, sy * wy));
+            }
+            // An interval that is empty by no more than rounding is a ray.
+            let room = top - bottom + (top.abs() + bottom.abs()) * Lane::splat(simd, 1e-13);
+            let square = dot(&base, &base);
+            let mixed = two * dot(&base, &lift);
+            for (end, height) in [top, bottom].into_iter().enumerate() {
+                let length = height.mul_add(height.mul_add(lift_squared, mixed), square);
+                let length = length
+                    .where_at_least(gap * slope, slack)
+                    .where_at_least(room, zero)
+                    .where_at_least(length, zero);
+                store::<S, 1>(
+                    std::array::from_mut(&mut self.squares[row + end]),
+                    v,
+                    [length],
+                );
+            }
         }
     }
 
     /// The motions left when y of contact `apex` is at the apex and that of another on a ray.
     #[inline(always)]
-    fn hold(&self, apex: usize, (other, j): (usize, usize), face: usize) -> Held {
+    fn hold(&self, [apex, other, face]: [usize; 3], j: usize) -> Held {
         let sides = &self.plane.sides;
-        let offset = sides[other].point - sides[apex].point;
-        let distance = offset.length();
-        let along = offset / distance;
+        let (along, distance) = self.plane.way(apex, other);
         let fixed = sides[apex].normal.truncate();
         let gap = along.dot(fixed - sides[other].normal.truncate());
         let direction = ray(&self.plane, other, j);
@@ -187,48 +208,45 @@ impl Kernel {
         let mut heights = sides.each_ref().map(|side| side.normal.z);
         heights[other] = moved.z;
         let origin = fixed - sides[apex].point.perp() * spin;
-        let velocity = Velocity::new(&self.plane);
+        let velocity = self.plane.velocity;
         Held {
-            apex,
-            ray: (other, j),
-            face,
             offset: fixed + lever.perp() * spin - sides[face].normal.truncate(),
             base: velocity.rigid(origin.to_array(), spin, heights),
-            lift: velocity.lift(face),
         }
     }
 
-    /// The same tests as in [`Kernel::apexes`], one face after the other.
+    /// One end of the interval of heights, as in [`Kernel::heights`].
     #[inline(always)]
-    fn offer_faces(
+    fn offer_end(
         &mut self,
-        held: &Held,
-        block: usize,
+        roles: [usize; 3],
+        j: usize,
+        top: bool,
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let edges = self.plane.edges;
-        for j in block * LANES..edges.min((block + 1) * LANES) {
-            let here = ray(&self.plane, held.face, j);
-            let next = ray(&self.plane, held.face, (j + 1) % edges);
-            let scale = here.truncate().perp_dot(next.truncate());
-            let sign = 1.0_f64.copysign(scale);
-            let alpha = held.offset.perp_dot(next.truncate());
-            let beta = here.truncate().perp_dot(held.offset);
-            if scale == 0.0 || alpha * sign < -SLACK || beta * sign < -SLACK {
-                continue;
-            }
-            let rise = (alpha * here.z + beta * next.z) / scale;
-            let twist = std::array::from_fn(|i| held.base[i] + held.lift[i] * rise);
-            let active = Active::Apex {
-                apex: held.apex,
-                ray: held.ray,
-                face: (held.face, j),
-            };
-            if dot(&twist, &twist) > *limit * (1.0 - TIE) {
-                self.offer(twist, active, question, limit)?;
+        let [apex, other, face] = roles;
+        let held = self.hold(roles, j);
+        let bounds = &self.bounds[face];
+        let (edges, sign) = if top {
+            (&bounds.above, 1.0)
+        } else {
+            (&bounds.below, -1.0)
+        };
+        let (mut rise, mut edge) = (f64::INFINITY, 0);
+        for (slope, j) in edges {
+            let height = sign * slope.dot(held.offset);
+            if height < rise {
+                (rise, edge) = (height, *j);
             }
         }
-        ControlFlow::Continue(())
+        let lift = self.plane.velocity.lift(face);
+        let twist = std::array::from_fn(|i| held.base[i] + lift[i] * (sign * rise));
+        let active = Active::Apex {
+            apex,
+            ray: (other, j),
+            edge: (face, edge),
+        };
+        self.offer(twist, active, question, limit)
     }
 }

@@ -51,13 +51,13 @@ pub(crate) fn of_facet(
     // The apex of a cone activates all its edges; any three of them span the force.
     let active = match vertex.active {
         Active::Rays(j) => std::array::from_fn(|k| (k / 2, (j[k / 2] + k % 2) % l)),
-        Active::Apex { apex, ray, face } => [
+        Active::Apex { apex, ray, edge } => [
             (apex, 0),
             (apex, l / 3),
             (apex, 2 * l / 3),
             ray,
             (ray.0, (ray.1 + 1) % l),
-            (face.0, (face.1 + 1) % l),
+            edge,
         ],
     };
     let wrenches = active.map(|(i, j)| {

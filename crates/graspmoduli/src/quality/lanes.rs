@@ -6,13 +6,20 @@ use std::ops::{Add, Div, Mul, Sub};
 
 /// What the kernel's formulas need of a number.
 ///
-/// No fused multiply-add: every instruction set gives the same bits.
+/// Where multiply-add is fused it is so by name, on every instruction set: all give the same bits.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
+    /// self · factor + addend, rounded once.
+    fn mul_add(self, factor: Self, addend: Self) -> Self;
 }
 
-impl Number for f64 {}
+impl Number for f64 {
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        f64::mul_add(self, factor, addend)
+    }
+}
 
 /// A vector register of numbers.
 #[derive(Clone, Copy)]
@@ -42,6 +49,27 @@ impl<S: Simd> Lane<S> {
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         Self::new(self.simd, self.simd.min_f64s(self.value, other.value))
+    }
+
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.max_f64s(self.value, other.value))
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self::new(self.simd, self.simd.abs_f64s(self.value))
+    }
+
+    /// 0 in the lanes in which `other` ≥ `low` does not hold.
+    #[inline(always)]
+    pub fn where_at_least(self, other: Self, low: Self) -> Self {
+        let simd = self.simd;
+        let mask = simd.greater_than_or_equal_f64s(other.value, low.value);
+        Self::new(
+            simd,
+            simd.select_f64s(mask, self.value, simd.splat_f64s(0.0)),
+        )
     }
 
     /// Is `self` ≥ `low` and `other` > 0 in any lane?
@@ -86,13 +114,23 @@ impl<S: Simd> Div for Lane<S> {
     }
 }
 
-impl<S: Simd> Number for Lane<S> {}
+impl<S: Simd> Number for Lane<S> {
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        let simd = self.simd;
+        Self::new(
+            simd,
+            simd.mul_add_f64s(self.value, factor.value, addend.value),
+        )
+    }
+}
 
 /// ⟨a, b⟩ in R⁶.
 #[inline(always)]
 pub(super) fn dot<T: Number>(a: &[T; 6], b: &[T; 6]) -> T {
-    let pair = |i: usize| a[i] * b[i];
-    ((pair(0) + pair(1)) + (pair(2) + pair(3))) + (pair(4) + pair(5))
+    let first = a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
+    let second = a[3].mul_add(b[3], a[4].mul_add(b[4], a[5] * b[5]));
+    first + second
 }
 
 // Loops, where a closure would be shorter: a closure is compiled without the instruction set.
@@ -120,27 +158,24 @@ pub(super) fn splat_all<S: Simd, const N: usize>(
     out
 }
 
-/// Vector `v` of a block of each table.
+/// Vector `v` of each row.
 #[inline(always)]
-pub(super) fn load<S: Simd, const N: usize>(
-    simd: S,
-    tables: &[Vec<Lanes>; N],
-    block: usize,
-    v: usize,
-) -> [Lane<S>; N] {
+pub(super) fn load<S: Simd, const N: usize>(simd: S, rows: &[Lanes; N], v: usize) -> [Lane<S>; N] {
     let mut out = [Lane::splat(simd, 0.0); N];
     for i in 0..N {
-        out[i] = Lane::new(simd, vectors::<S>(&tables[i][block])[v]);
+        out[i] = Lane::new(simd, S::as_simd_f64s(&rows[i].0).0[v]);
     }
     out
 }
 
+/// Sets vector `v` of each row.
 #[inline(always)]
-fn vectors<S: Simd>(row: &Lanes) -> &[S::f64s] {
-    S::as_simd_f64s(row).0
-}
-
-#[inline(always)]
-pub(super) fn vectors_mut<S: Simd>(row: &mut Lanes) -> &mut [S::f64s] {
-    S::as_mut_simd_f64s(row).0
+pub(super) fn store<S: Simd, const N: usize>(
+    rows: &mut [Lanes; N],
+    v: usize,
+    values: [Lane<S>; N],
+) {
+    for i in 0..N {
+        S::as_mut_simd_f64s(&mut rows[i].0).0[v] = values[i].value;
+    }
 }

@@ -1,21 +1,47 @@
 //! Vertices of P with all three velocities on rays of their cones.
 
-use super::lanes::{Lane, dot, load, splat_all, splat_each, vectors_mut};
-use super::plane::{LANES, Lanes};
-use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, TINY, at, ray};
-use super::velocity::Velocity;
+use super::apex_ray_face::LEVEL;
+use super::lanes::{Lane, Number, dot, load, splat_all, splat_each, store};
+use super::plane::{LANES, Lanes, at};
+use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, TINY, ray};
 use glam::DVec2;
 use pulp::Simd;
 use std::ops::ControlFlow;
 
-/// Coefficients of D, N₁, N₃ and of the quadratic form ‖D·x‖² − limit·D²; a lane per ray of
-/// contact 2. See [`Kernel::rays`].
+/// What the kernel's rows need, for a block of rays of contact 1 and one of contact 2; see
+/// [`Kernel::rays`] and [`Kernel::forms`]. A lane per ray.
 #[derive(Debug, Clone, Default)]
+pub(super) struct Forms {
+    first: First,
+    second: Second,
+    /// Per ray of contact 1; lanes over rays of contact 2.
+    rows: [Form; LANES],
+}
+
+/// What belongs to a ray of contact 1.
+#[derive(Debug, Clone, Default)]
+struct First {
+    a: [Lanes; 6],
+    n2: [Lanes; 2],
+    scalars: [Lanes; 14],
+}
+
+/// What belongs to a ray of contact 2.
+#[derive(Debug, Clone, Default)]
+struct Second {
+    b: [Lanes; 6],
+    n1: [Lanes; 2],
+    scalars: [Lanes; 8],
+}
+
+/// Coefficients of D, N₃ and of the quadratic form ‖D·x‖² − limit·D².
+#[derive(Debug, Clone, Copy, Default)]
 struct Form {
     d: [Lanes; 2],
-    n1: [Lanes; 2],
     n3: Lanes,
     squares: [Lanes; 6],
+    /// Rays of contact 2 that can go with this one of contact 1, as bits.
+    open: u32,
 }
 
 impl Kernel {
@@ -34,43 +60,21 @@ impl Kernel {
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let k = self.gaps();
         self.project_rays();
-        let edges = self.plane.edges;
-        let blocks = edges.div_ceil(LANES);
-        let slack = Lane::splat(simd, -SLACK);
-        let mut form = Form::default();
-        for j1 in 0..edges {
+        let blocks = self.plane.edges.div_ceil(LANES);
+        let tie = self.tie();
+        for block1 in 0..blocks {
             for block2 in 0..blocks {
-                let bar = *limit * (1.0 - TIE);
-                self.form(simd, &mut form, j1, block2, k, bar);
-                let [a1, b1] = self.pairs[0].each_ref().map(|row| at(row, j1));
-                let n2 = [a1 * k[2], k[0] * b1 - a1 * k[1]];
-                let n2_lanes = [Lane::splat(simd, n2[0]), Lane::splat(simd, n2[1])];
-                let tiny = Lane::splat(simd, TINY * bar);
-                for lane2 in 0..LANES.min(edges - block2 * LANES) {
-                    let d = splat_all(simd, &form.d, lane2);
-                    let n1 = splat_all(simd, &form.n1, lane2);
-                    let n3 = Lane::splat(simd, form.n3[lane2]);
-                    let q = splat_all(simd, &form.squares, lane2);
-                    for block3 in 0..blocks {
-                        let mut any = false;
-                        for v in 0..LANES / S::F64_LANES {
-                            let [b, c] = load(simd, &self.pairs[2], block3, v);
-                            let p = load(simd, &self.products, block3, v);
-                            let det = d[0] * b + d[1] * c;
-                            let first = (n1[0] * b + n1[1] * c).signed_by(det);
-                            let second = (n2_lanes[0] * b + n2_lanes[1] * c).signed_by(det);
-                            let worst = first.min(second).min(n3.signed_by(det));
-                            let excess = ((q[0] * p[0] + q[1] * p[1])
-                                + (q[2] * p[2] + q[3] * p[3]))
-                                + ((q[4] * p[4] + q[5] * p[5]) - tiny);
-                            any |= worst.any_at_least(slack, excess);
-                        }
-                        if any {
-                            let at = [j1, block2 * LANES + lane2, block3];
-                            self.offer_rays(&form, n2, at, question, limit)?;
-                        }
+                let mut bar = *limit * (1.0 - tie);
+                self.forms(simd, block1, block2, bar);
+                let mut row = 0;
+                while row < LANES.min(self.plane.edges - block1 * LANES) {
+                    self.row(simd, [block1, row, block2], tie, bar, question, limit)?;
+                    row += 1;
+                    // A longer twist found: the rows after this one can refuse more.
+                    if *limit * (1.0 - tie) > 2.0 * bar {
+                        bar = *limit * (1.0 - tie);
+                        self.forms(simd, block1, block2, bar);
                     }
                 }
             }
@@ -78,114 +82,265 @@ impl Kernel {
         ControlFlow::Continue(())
     }
 
+    /// The rays of contacts 2 and 3 that go with one ray of contact 1.
+    #[inline(always)]
+    fn row<S: Simd>(
+        &mut self,
+        simd: S,
+        [block1, lane1, block2]: [usize; 3],
+        tie: f64,
+        bar: f64,
+        question: Question,
+        limit: &mut f64,
+    ) -> ControlFlow<()> {
+        let blocks = self.plane.edges.div_ceil(LANES);
+        let slack = Lane::splat(simd, -SLACK);
+        let minus_tiny = Lane::splat(simd, -TINY * bar);
+        let n2 = splat_all(simd, &self.forms.first.n2, lane1);
+        let mut open = self.forms.rows[lane1].open;
+        while open != 0 {
+            let lane2 = open.trailing_zeros() as usize;
+            open &= open - 1;
+            let form = &self.forms.rows[lane1];
+            let d = splat_all(simd, &form.d, lane2);
+            let n1 = splat_all(simd, &self.forms.second.n1, lane2);
+            let n3 = Lane::splat(simd, form.n3[lane2]);
+            let q = splat_all(simd, &form.squares, lane2);
+            for block3 in 0..blocks {
+                let mut any = false;
+                for v in 0..LANES / S::F64_LANES {
+                    let [b, c, bb, bc, cc, bz, cz, zz] = load(simd, &self.third[block3], v);
+                    let det = d[0].mul_add(b, d[1] * c);
+                    let first = n1[0].mul_add(b, n1[1] * c).signed_by(det);
+                    let second = n2[0].mul_add(b, n2[1] * c).signed_by(det);
+                    let worst = first.min(second).min(n3.signed_by(det));
+                    let excess = q[0].mul_add(bb, q[1].mul_add(bc, q[2] * cc))
+                        + q[3].mul_add(bz, q[4].mul_add(cz, q[5].mul_add(zz, minus_tiny)));
+                    any |= worst.any_at_least(slack, excess);
+                }
+                if any {
+                    let at = [block1 * LANES + lane1, block2 * LANES + lane2, block3];
+                    self.offer_rays(at, tie, question, limit)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Relative rounding error to allow for in the quadratic forms: they cancel where the
+    /// triangle of contacts is low or the centre of mass far.
+    #[inline(always)]
+    fn tie(&self) -> f64 {
+        let [first, second, third] = self.plane.length();
+        let longest = first.max(second).max(third);
+        let reach = self.plane.center.length();
+        let shape = longest * longest / (first * self.plane.sides[2].point.y)
+            * (1.0 + reach.min(reach / longest));
+        (1e-14 * shape * shape).clamp(TIE, 1.0)
+    }
+
     /// k₁₂, k₁₃, k₂₃.
     #[inline(always)]
     fn gaps(&self) -> [f64; 3] {
-        let [e12, e13, e23] = self.plane.along;
+        let [e12, e13, e23] = self.plane.along();
         let normals = self.plane.sides.each_ref().map(|side| side.normal);
         let k = |e: DVec2, from: usize, to: usize| e.dot((normals[to] - normals[from]).truncate());
         [k(e12, 0, 1), k(e13, 0, 2), k(e23, 1, 2)]
     }
 
-    /// Fills `pairs` and `products`.
+    /// Fills `pairs` and `third`.
     #[inline(always)]
     fn project_rays(&mut self) {
-        let [e12, e13, e23] = self.plane.along;
-        for (contact, directions) in [[e12, e13], [e12, e23], [e13, e23]].into_iter().enumerate() {
-            let [x, y, _] = &self.plane.sides[contact].ray;
-            for (pair, e) in self.pairs[contact].iter_mut().zip(directions) {
-                for (out, (x, y)) in pair.iter_mut().zip(x.iter().zip(y)) {
+        let [e12, e13, e23] = self.plane.along();
+        for (contact, directions) in [[e12, e13], [e12, e23]].into_iter().enumerate() {
+            for (pair, [x, y, _]) in self.pairs[contact]
+                .iter_mut()
+                .zip(&self.plane.sides[contact].ray)
+            {
+                for (out, e) in pair.iter_mut().zip(directions) {
                     for lane in 0..LANES {
                         out[lane] = e.x * x[lane] + e.y * y[lane];
                     }
                 }
             }
         }
-        for block in 0..self.products[0].len() {
-            let [b, c] = self.pairs[2].each_ref().map(|rows| rows[block]);
-            let z = self.plane.sides[2].ray[2][block];
-            let rows = [(b, b), (b, c), (c, c), (b, z), (c, z), (z, z)];
-            for (products, (left, right)) in self.products.iter_mut().zip(rows) {
-                for lane in 0..LANES {
-                    products[block][lane] = left[lane] * right[lane];
+        for (out, [x, y, z]) in self.third.iter_mut().zip(&self.plane.sides[2].ray) {
+            for lane in 0..LANES {
+                let b = e13.x * x[lane] + e13.y * y[lane];
+                let c = e23.x * x[lane] + e23.y * y[lane];
+                let z = z[lane];
+                for (row, value) in [b, c, b * b, b * c, c * c, b * z, c * z, z * z]
+                    .into_iter()
+                    .enumerate()
+                {
+                    out[row][lane] = value;
                 }
             }
         }
     }
 
-    /// The coefficients that do not depend on the ray of contact 3.
+    /// Coefficients that do not depend on the ray of contact 3.
+    ///
+    /// With X the twist of the normals and A, B, L those of ray 1, ray 2 and a lift of contact 3,
+    ///   D·x = D X + N₁ A + N₂ B + N₃ z₃ L = b₃ P + c₃ R + N₃ z₃ L,
+    ///   P = c₂ G + a₂ H + t B,  G = a₁X + k₁₂A,  H = k₂₃A,  t = a₁k₂₃,
+    ///   R = a₂ G' + u B,  G' = −b₁X − k₁₃A,  u = k₁₂b₁ − a₁k₁₃.
+    /// D is b₃c₂a₁ − c₃a₂b₁, so −bar·D² only changes ⟨G, G⟩, ⟨G, G'⟩ and ⟨G', G'⟩.
     #[inline(always)]
-    fn form<S: Simd>(
-        &self,
-        simd: S,
-        form: &mut Form,
-        j1: usize,
-        block2: usize,
-        [k12, k13, k23]: [f64; 3],
-        bar: f64,
-    ) {
-        let splat = |x: f64| Lane::splat(simd, x);
-        let velocity = Velocity::new(&self.plane);
+    fn forms<S: Simd>(&mut self, simd: S, block1: usize, block2: usize, bar: f64) {
+        let gaps = self.gaps();
+        let Self {
+            plane,
+            pairs,
+            forms:
+                Forms {
+                    first,
+                    second,
+                    rows,
+                },
+            ..
+        } = &mut *self;
+        let velocity = plane.velocity;
         let lift = velocity.lift(2);
-        let lift_squared = splat(dot(&lift, &lift));
+        let [n1, n2, n3] = velocity.normal;
+        let x = velocity.twist(n1, n2[1], n2[2], n3[2]);
+        let xx = Lane::splat(simd, dot(&x, &x));
+        let xl = Lane::splat(simd, dot(&x, &lift));
+        let lift_squared = Lane::splat(simd, dot(&lift, &lift));
+        let x = splat_each(simd, x);
         let lift = splat_each(simd, lift);
         let velocity = velocity.splat(simd);
-        let (a1, b1) = (at(&self.pairs[0][0], j1), at(&self.pairs[0][1], j1));
-        let ray1 = splat_each(simd, ray(&self.plane, 0, j1).to_array());
-        let n2 = [splat(a1 * k23), splat(k12 * b1 - a1 * k13)];
-        let third = splat(k12 * b1 - k13 * a1);
-        let (a1, b1, b1k23) = (splat(a1), splat(-b1), splat(b1 * k23));
-        let (k12, k13, k23) = (splat(k12), splat(-k13), splat(k23));
-        let (bar, two) = (splat(bar), splat(2.0));
+        let [k12, k13, k23] = splat_each(simd, gaps);
+        let limit = Lane::splat(simd, bar);
+        let zero = Lane::splat(simd, 0.0);
+        let two = Lane::splat(simd, 2.0);
         for v in 0..LANES / S::F64_LANES {
-            let [a2, c2] = load(simd, &self.pairs[1], block2, v);
-            let [_, y2, z2] = load(simd, &self.plane.sides[1].ray, block2, v);
-            let d = [a1 * c2, b1 * a2];
-            let n1 = [k12 * c2 + k23 * a2, k13 * a2];
-            let n3 = b1k23 * a2 + third * c2;
-            let x = velocity.scaled(d[0], ray1, n1[0], [y2, z2], n2[0]);
-            let y = velocity.scaled(d[1], ray1, n1[1], [y2, z2], n2[1]);
-            let twice = two * n3;
-            let rows = [
-                dot(&x, &x) - bar * d[0] * d[0],
-                two * (dot(&x, &y) - bar * d[0] * d[1]),
-                dot(&y, &y) - bar * d[1] * d[1],
-                twice * dot(&x, &lift),
-                twice * dot(&y, &lift),
-                n3 * n3 * lift_squared,
+            let [a1, b1] = load(simd, &pairs[0][block1], v);
+            let ray1 = load(simd, &plane.sides[0].ray[block1], v);
+            let a = velocity.twist(ray1, zero, zero, zero);
+            let (xa, aa, al) = (dot(&x, &a), dot(&a, &a), dot(&a, &lift));
+            let u = k12 * b1 - a1 * k13;
+            // ⟨G, ·⟩ and ⟨G', ·⟩ with X and A.
+            let (gx, ga) = (a1 * xx + k12 * xa, a1 * xa + k12 * aa);
+            let (hx, ha) = (b1 * xx + k13 * xa, b1 * xa + k13 * aa);
+            let scalars = [
+                a1,
+                zero - b1,
+                a1 * k23,
+                u,
+                b1 * k23,
+                a1 * gx + k12 * ga - limit * a1 * a1,
+                two * k23 * ga,
+                k23 * k23 * aa,
+                limit * a1 * b1 - (a1 * hx + k12 * ha),
+                zero - k23 * ha,
+                b1 * hx + k13 * ha - limit * b1 * b1,
+                a1 * xl + k12 * al,
+                k23 * al,
+                zero - (b1 * xl + k13 * al),
             ];
-            for h in 0..2 {
-                vectors_mut::<S>(&mut form.d[h])[v] = d[h].value;
-                vectors_mut::<S>(&mut form.n1[h])[v] = n1[h].value;
-            }
-            vectors_mut::<S>(&mut form.n3)[v] = n3.value;
-            for row in 0..6 {
-                vectors_mut::<S>(&mut form.squares[row])[v] = rows[row].value;
+            store::<S, 6>(&mut first.a, v, a);
+            store::<S, 2>(&mut first.n2, v, [a1 * k23, u]);
+            store::<S, 14>(&mut first.scalars, v, scalars);
+
+            let [a2, c2] = load(simd, &pairs[1][block2], v);
+            let [_, y2, z2] = load(simd, &plane.sides[1].ray[block2], v);
+            let b = velocity.twist([zero, zero, zero], y2, z2, zero);
+            let scalars = [
+                a2,
+                c2,
+                a2 * a2,
+                a2 * c2,
+                c2 * c2,
+                dot(&x, &b),
+                dot(&b, &b),
+                dot(&b, &lift),
+            ];
+            store::<S, 6>(&mut second.b, v, b);
+            store::<S, 2>(&mut second.n1, v, [k12 * c2 + k23 * a2, zero - k13 * a2]);
+            store::<S, 8>(&mut second.scalars, v, scalars);
+        }
+        let edges = plane.edges;
+        // ρ₁, ρ₂ ≥ 0 solve the first equation only where a₁ or −a₂ has the sign of k₁₂.
+        let sign = gaps[0].signum();
+        let mut with_any = 0;
+        for lane in 0..LANES.min(edges - block2 * LANES) {
+            with_any |= 1 << lane;
+        }
+        let mut with_some = 0;
+        for lane in 0..LANES {
+            with_some |= u32::from(sign * second.scalars[0][lane] < 0.0) << lane;
+        }
+        for (lane1, form) in rows.iter_mut().enumerate() {
+            let any2 = sign * first.scalars[0][lane1] > 0.0 || gaps[0].abs() < LEVEL;
+            form.open = if any2 { with_any } else { with_some & with_any };
+            let a = splat_all(simd, &first.a, lane1);
+            let [
+                a1,
+                minus_b1,
+                t,
+                u,
+                b1k23,
+                gg,
+                gh,
+                hh,
+                gr,
+                hr,
+                rr,
+                gl,
+                hl,
+                rl,
+            ] = splat_all(simd, &first.scalars, lane1);
+            for v in 0..LANES / S::F64_LANES {
+                let b = load(simd, &second.b, v);
+                let [n11, n12] = load(simd, &second.n1, v);
+                let [a2, c2, aa, ac, cc, xb, bb, bl] = load(simd, &second.scalars, v);
+                let d = [a1 * c2, minus_b1 * a2];
+                let n3 = b1k23.mul_add(a2, u * c2);
+                let ab = dot(&a, &b);
+                let left = d[0].mul_add(xb, n11 * ab);
+                let right = d[1].mul_add(xb, n12 * ab);
+                let (tbb, ubb) = (t * bb, u * bb);
+                let pp = two.mul_add(left, tbb).mul_add(t, hh * aa);
+                let pr = gr.mul_add(ac, hr * aa) + u.mul_add(left, t * (right + ubb));
+                let twice = two * n3;
+                let squares = [
+                    gg.mul_add(cc, gh.mul_add(ac, pp)),
+                    two * pr,
+                    two.mul_add(right, ubb).mul_add(u, rr * aa),
+                    twice * c2.mul_add(gl, a2.mul_add(hl, t * bl)),
+                    twice * a2.mul_add(rl, u * bl),
+                    n3 * n3 * lift_squared,
+                ];
+                store::<S, 2>(&mut form.d, v, d);
+                store::<S, 1>(std::array::from_mut(&mut form.n3), v, [n3]);
+                store::<S, 6>(&mut form.squares, v, squares);
             }
         }
     }
 
-    /// The same tests as in [`Kernel::rays`], one ray of contact 3 after the other.
+    /// The same tests as in [`Kernel::row`], one ray of contact 3 after the other.
     #[inline(always)]
     fn offer_rays(
         &mut self,
-        form: &Form,
-        n2: [f64; 2],
         [j1, j2, block3]: [usize; 3],
+        tie: f64,
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let lane2 = j2 % LANES;
-        let velocity = Velocity::new(&self.plane);
+        let (lane1, lane2) = (j1 % LANES, j2 % LANES);
+        let velocity = self.plane.velocity;
         let normals = self.plane.sides.each_ref().map(|side| side.normal);
         let (ray1, ray2) = (ray(&self.plane, 0, j1), ray(&self.plane, 1, j2));
+        let form = &self.forms.rows[lane1];
+        let d = form.d.map(|row| row[lane2]);
         let n3 = form.n3[lane2];
+        let n1 = self.forms.second.n1.map(|row| row[lane2]);
+        let n2 = self.forms.first.n2.map(|row| row[lane1]);
         for j3 in block3 * LANES..self.plane.edges.min((block3 + 1) * LANES) {
-            let [b, c] = self.pairs[2].each_ref().map(|row| at(row, j3));
-            let along = |row: [f64; 2]| row[0] * b + row[1] * c;
-            let det = along(form.d.map(|row| row[lane2]));
-            let n1 = along(form.n1.map(|row| row[lane2]));
-            let n2 = along(n2);
+            let [b, c, ..] = at(&self.third, j3);
+            let along = |row: [f64; 2]| row[0].mul_add(b, row[1] * c);
+            let (det, n1, n2) = (along(d), along(n1), along(n2));
             let sign = 1.0_f64.copysign(det);
             if det == 0.0 || [n1, n2, n3].iter().any(|n| n * sign < -SLACK) {
                 continue;
@@ -198,7 +353,7 @@ impl Kernel {
                 normals[2].z + ray(&self.plane, 2, j3).z * (n3 / det),
             );
             // As in the quadratic form, a vanishing determinant counts as 1e-14.
-            if dot(&twist, &twist) * det * det > *limit * (1.0 - TIE) * (det * det + TINY) {
+            if dot(&twist, &twist) * det * det > *limit * (1.0 - tie) * (det * det + TINY) {
                 self.offer(twist, Active::Rays([j1, j2, j3]), question, limit)?;
             }
         }

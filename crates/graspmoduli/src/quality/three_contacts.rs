@@ -13,8 +13,10 @@
 //! an upper bound of Q_l, and degenerate candidates (0/0) can do no harm.
 
 use super::Twist;
+use super::apex_ray_face::Bounds;
 use super::lanes::dot;
-use super::plane::{LANES, Lanes, Plane};
+use super::plane::{LANES, Lanes, Plane, Table, at, zeros};
+use super::ray_ray_ray::Forms;
 use crate::contact::{Contact, FrictionCone};
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
@@ -35,16 +37,16 @@ pub(crate) enum Active {
     /// y_i on ray j_i of its cone, for all three.
     Rays([usize; 3]),
     /// y of the first contact at the apex, of the second on a ray, of the third on the face
-    /// between a ray and the next.
+    /// orthogonal to an edge.
     Apex {
         apex: usize,
         ray: (usize, usize),
-        face: (usize, usize),
+        edge: (usize, usize),
     },
 }
 
 /// A vertex of P, or a point on an edge or face of P that rounding took for one.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Vertex {
     /// (v, ω) in the object frame, on the boundary of P.
     pub twist: Twist,
@@ -71,25 +73,31 @@ pub(super) enum Question {
 pub(crate) struct Kernel {
     arch: Arch,
     pub(super) plane: Plane,
-    /// Per ray: components along two sides of the triangle; see [`Kernel::rays`].
-    pub(super) pairs: [[Vec<Lanes>; 2]; 3],
-    /// Per ray of contact 3: b², bc, c², bz, cz, z² of its components b₃, c₃ and normal one z.
-    pub(super) products: [Vec<Lanes>; 6],
-    /// Of each contact, x, y, z of rays j + 1 and their cross products with rays j in the plane.
-    pub(super) faces: [[Vec<Lanes>; 4]; 3],
+    /// Per ray of contacts 1 and 2: components along two sides of the triangle; see
+    /// [`Kernel::rays`].
+    pub(super) pairs: [Table<2>; 2],
+    /// Per ray of contact 3: components b, c along two sides and z out of the plane as b, c, b²,
+    /// bc, c², bz, cz, z².
+    pub(super) third: Table<8>,
+    pub(super) bounds: [Bounds; 3],
+    /// ‖x‖² of candidates; see [`Kernel::apexes`].
+    pub(super) squares: Vec<Lanes>,
+    pub(super) forms: Forms,
     found: Vec<Vertex>,
 }
 
 impl Kernel {
     pub fn new(cone: &FrictionCone) -> Self {
         let plane = Plane::new(cone);
-        let zeros = plane.sides[0].ray[0].clone();
+        let edges = cone.len();
         Self {
             arch: Arch::new(),
             plane,
-            pairs: std::array::from_fn(|_| [zeros.clone(), zeros.clone()]),
-            products: std::array::from_fn(|_| zeros.clone()),
-            faces: std::array::from_fn(|_| std::array::from_fn(|_| zeros.clone())),
+            pairs: [zeros(edges), zeros(edges)],
+            third: zeros(edges),
+            bounds: std::array::from_fn(|_| Bounds::new(edges)),
+            squares: vec![Lanes::default(); 12 * edges.div_ceil(LANES)],
+            forms: Forms::default(),
             found: Vec::new(),
         }
     }
@@ -169,8 +177,7 @@ impl Kernel {
         let mut supports = [0.0; LANES];
         for side in &self.plane.sides {
             let v = velocity + omega.cross(side.point.extend(0.0) - self.plane.center);
-            let [xs, ys, zs] = &side.edge;
-            for (x, (y, z)) in xs.iter().zip(ys.iter().zip(zs)) {
+            for [x, y, z] in &side.edge {
                 for lane in 0..LANES {
                     let along = x[lane] * v.x + y[lane] * v.y + z[lane] * v.z;
                     supports[lane] = greatest(along, supports[lane]);
@@ -239,7 +246,6 @@ impl WithSimd for Ask<'_> {
             Question::All(limit, _) => limit,
             _ => 0.0,
         };
-        kernel.project_faces();
         if kernel.apexes(simd, question, &mut limit).is_continue() {
             let _ = kernel.rays(simd, question, &mut limit);
         }
@@ -248,18 +254,68 @@ impl WithSimd for Ask<'_> {
 }
 
 #[inline(always)]
-pub(super) fn at(rows: &[Lanes], index: usize) -> f64 {
-    rows[index / LANES][index % LANES]
-}
-
-#[inline(always)]
 pub(super) fn ray(plane: &Plane, contact: usize, index: usize) -> DVec3 {
-    let [x, y, z] = &plane.sides[contact].ray;
-    DVec3::new(at(x, index), at(y, index), at(z, index))
+    at(&plane.sides[contact].ray, index).into()
 }
 
 /// Without the care for NaN that `f64::max` takes: one instruction.
 #[inline(always)]
 fn greatest(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Uniform in the ball of radius 1 and on the sphere.
+    fn grasps(count: usize) -> Vec<([Contact; 3], DVec3)> {
+        let mut state = 1u64;
+        let mut draw = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+        };
+        let mut ball = || loop {
+            let v = DVec3::new(draw(), draw(), draw());
+            if v.length_squared() < 1.0 {
+                return v;
+            }
+        };
+        (0..count)
+            .map(|_| {
+                let contacts = [0; 3].map(|_| Contact {
+                    point: ball(),
+                    normal: ball().normalize(),
+                });
+                (contacts, ball())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let mut sets = vec![Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+            sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+        }
+        for (friction, edges) in [(1.0, 8), (0.4, 3), (0.7, 13), (1.0, 16)] {
+            let cone = FrictionCone::new(friction, edges).unwrap();
+            let mut kernels = sets.iter().map(|&arch| Kernel {
+                arch,
+                ..Kernel::new(&cone)
+            });
+            let mut portable = kernels.next().unwrap();
+            let mut others: Vec<Kernel> = kernels.collect();
+            for (contacts, center) in grasps(2000) {
+                let wanted = portable.longest(&contacts, center);
+                for kernel in &mut others {
+                    assert_eq!(kernel.longest(&contacts, center), wanted);
+                }
+            }
+        }
+    }
 }

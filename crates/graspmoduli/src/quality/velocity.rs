@@ -6,7 +6,7 @@ use super::plane::Plane;
 use pulp::Simd;
 
 /// Twists from velocities of the contacts, in the frame of the plane.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Velocity<T> {
     pub normal: [[T; 3]; 3],
     /// Contact 2 is at (p, 0), contact 3 at (q, s).
@@ -22,7 +22,7 @@ impl Velocity<f64> {
         let third = plane.sides[2].point;
         Self {
             normal: plane.sides.each_ref().map(|side| side.normal.to_array()),
-            inverse_p: 1.0 / plane.length[0],
+            inverse_p: 1.0 / plane.length()[0],
             inverse_s: 1.0 / third.y,
             q: third.x,
             center: plane.center.to_array(),
@@ -63,33 +63,16 @@ impl<T: Number> Velocity<T> {
         self.rigid([x, y], spin, [z, second_z, third_z])
     }
 
-    /// D times the twist, but for the motion of contact 3 along its ray: a coefficient in its
-    /// linear dependence on that ray. `d`, `n1`, `n2` are those of D, N₁ and N₂.
-    #[inline(always)]
-    pub(super) fn scaled(&self, d: T, ray1: [T; 3], n1: T, ray2: [T; 2], n2: T) -> [T; 6] {
-        let [first, second, third] = self.normal;
-        self.twist(
-            [
-                first[0] * d + ray1[0] * n1,
-                first[1] * d + ray1[1] * n1,
-                first[2] * d + ray1[2] * n1,
-            ],
-            second[1] * d + ray2[0] * n2,
-            second[2] * d + ray2[1] * n2,
-            third[2] * d,
-        )
-    }
-
     /// From the planar velocity of contact 1, the spin, and the velocities out of the plane.
     #[inline(always)]
     pub(super) fn rigid(&self, origin: [T; 2], spin: T, [z1, z2, z3]: [T; 3]) -> [T; 6] {
         let wy = (z1 - z2) * self.inverse_p;
-        let wx = (z3 - z1 + wy * self.q) * self.inverse_s;
+        let wx = wy.mul_add(self.q, z3 - z1) * self.inverse_s;
         let [x, y, z] = self.center;
         [
-            origin[0] + wy * z - spin * y,
-            origin[1] + spin * x - wx * z,
-            z1 + wx * y - wy * x,
+            wy.mul_add(z, origin[0]) - spin * y,
+            spin.mul_add(x, origin[1]) - wx * z,
+            wx.mul_add(y, z1) - wy * x,
             wx,
             wy,
             spin,
