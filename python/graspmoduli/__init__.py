@@ -1,7 +1,9 @@
 """Exact grasp quality, and grasps on families of shapes.
 
 =====================  ======================================================================
-grasp quality          :func:`quality`, :func:`quality_gradient`
+grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
+many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
+one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
@@ -24,12 +26,20 @@ from .grasps import Grasp as Grasp
 from .grasps import PlacedGrasp as PlacedGrasp
 from .grasps import RankedGrasp as RankedGrasp
 from .grasps import place as place
+from .quality import Bounds as Bounds
+from .quality import Extreme as Extreme
 from .quality import QualityGradient as QualityGradient
+from .quality import circular_quality as circular_quality
+from .quality import largest_quality as largest_quality
 from .quality import quality as quality
+from .quality import quality_at_least as quality_at_least
 from .quality import quality_gradient as quality_gradient
+from .quality import smallest_quality as smallest_quality
 from .sampling import sample_points as sample_points
 from .surfaces import Surface as Surface
 from .surfaces import combine as combine
 from .surfaces import project as project
 from .synthesis import best_grasps as best_grasps
 from .synthesis import synthesize as synthesize
+from .wrench_space import Resistance as Resistance
+from .wrench_space import WrenchSpace as WrenchSpace

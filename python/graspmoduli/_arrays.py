@@ -25,7 +25,10 @@ def floats(name: str, value: ArrayLike) -> Floats:
         raise GraspModuliError(f"{name} must be an array of numbers, got {_brief(value)}") from None
     # ascontiguousarray makes a 0-d array 1-d.
     array = array.reshape(np.shape(value))
-    if not np.isfinite(array).all():
+    # A sum is finite only if all its terms are; large ones are looked at one by one.
+    with np.errstate(over="ignore", invalid="ignore"):
+        suspicious = not np.isfinite(array.sum())
+    if suspicious and not np.isfinite(array).all():
         index = np.argwhere(~np.isfinite(array))[0]
         where = f" at index {tuple(index.tolist())}" if array.ndim else ""
         raise GraspModuliError(f"{name} must be finite, got {array[tuple(index)]}{where}")
@@ -44,7 +47,12 @@ def vectors(name: str, value: ArrayLike, shape: str) -> Floats:
 
 def unit(name: str, array: Floats) -> Floats:
     """Normals made exactly unit, if they nearly are."""
-    lengths = np.linalg.norm(array, axis=-1)
+    squares = np.einsum("...i,...i->...", array, array)
+    # What is unit to rounding keeps its bits.
+    off = np.abs(squares - 1.0)
+    if off.max(initial=0.0) < 2e-15:
+        return array
+    lengths = np.sqrt(squares)
     wrong = ~(np.abs(lengths - 1.0) <= UNIT_TOLERANCE)
     if wrong.any():
         index = np.argwhere(wrong)[0]
@@ -53,9 +61,7 @@ def unit(name: str, array: Floats) -> Floats:
             f"{name} must be unit vectors, got one of length "
             f"{float(lengths[tuple(index)]):.6g}{where}"
         )
-    # What is unit to rounding keeps its bits.
-    exact = np.abs(lengths - 1.0) < 1e-15
-    return np.where(exact[..., None], array, array / lengths[..., None])
+    return np.where(off[..., None] < 2e-15, array, array / lengths[..., None])
 
 
 def grasps(
@@ -135,6 +141,14 @@ def count(name: str, value: Any, least: int) -> int:
 def cone(friction: Any, edges: Any) -> tuple[float, int]:
     """Friction coefficient μ > 0 and number of edges l ≥ 3."""
     return number("friction", friction, positive=True), count("edges", edges, 3)
+
+
+def coefficient(name: str, value: Any) -> float:
+    """A finite number, 0 or positive."""
+    result = number(name, value)
+    if result < 0.0:
+        raise GraspModuliError(f"{name} must be a finite number, 0 or positive, got {result}")
+    return result
 
 
 def locked(array: Floats) -> Floats:

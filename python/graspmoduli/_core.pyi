@@ -11,11 +11,56 @@ class GraspModuliError(ValueError):
     """Wrong input: names the argument, what was wanted and what came."""
 
 def quality(
-    contacts: Floats, normals: Floats, center_of_mass: Floats, friction: float, edges: int
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: Floats,
+    friction: float,
+    edges: int,
+    torsion: float,
+    each: bool,
 ) -> Floats: ...
 def quality_gradient(
-    contacts: Floats, normals: Floats, center_of_mass: Floats, friction: float, edges: int
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: Floats,
+    friction: float,
+    edges: int,
+    torsion: float,
 ) -> Floats: ...
+def quality_at_least(
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: Floats,
+    threshold: float,
+    friction: float,
+    edges: int,
+    torsion: float,
+) -> NDArray[np.bool_]: ...
+def extreme_quality(
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: Floats,
+    friction: float,
+    edges: int,
+    torsion: float,
+    largest: bool,
+) -> tuple[int, float] | None: ...
+def circular_quality(
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: Floats,
+    friction: float,
+    tolerance: float,
+) -> Floats: ...
+def weakest(
+    contacts: Floats,
+    normals: Floats,
+    center_of_mass: tuple[float, float, float],
+    friction: float,
+    edges: int,
+    torsion: float,
+    each: bool,
+) -> tuple[float, list[float]]: ...
 
 class Surface:
     def __new__(cls, bottom: float, top: float, coefficients: Floats) -> Surface: ...

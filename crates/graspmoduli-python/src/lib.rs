@@ -4,7 +4,7 @@
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
 use graspmoduli::error::Error;
-use graspmoduli::quality::{Batch, Gradient};
+use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use graspmoduli::search;
 use graspmoduli::synthesis;
 use graspmoduli::{sampling, surface};
@@ -42,8 +42,20 @@ fn batch<'a>(
     })
 }
 
-/// Exact Q_l of n grasps.
+/// The friction cone of hard or soft fingers.
+fn cone(friction: f64, edges: usize, torsion: f64) -> PyResult<FrictionCone> {
+    FrictionCone::new(friction, edges)
+        .and_then(|cone| cone.soft(torsion))
+        .map_err(raise)
+}
+
+fn norm(each: bool) -> Norm {
+    if each { Norm::Each } else { Norm::Sum }
+}
+
+/// Exact Q_l of n grasps, or Q'_l if `each`.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
 fn quality<'py>(
     py: Python<'py>,
     contacts: PyReadonlyArray3<'py, f64>,
@@ -51,12 +63,13 @@ fn quality<'py>(
     center_of_mass: PyReadonlyArray2<'py, f64>,
     friction: f64,
     edges: usize,
+    torsion: f64,
+    each: bool,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, &mut out))
-        .map_err(raise)?;
+    py.detach(|| batch.quality(&cone, norm(each), &mut out));
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -69,26 +82,107 @@ fn quality_gradient<'py>(
     center_of_mass: PyReadonlyArray2<'py, f64>,
     friction: f64,
     edges: usize,
+    torsion: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let cone = cone(friction, edges, torsion)?;
+    let width = Gradient::width(contacts.as_array().shape()[1]);
     let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![Gradient::ZERO; batch.centers.len()];
-    py.detach(|| batch.gradient(&cone, &mut out))
-        .map_err(raise)?;
-    table(py, out.iter().map(flat).collect())
+    let mut out = vec![0.0; batch.centers.len() * width];
+    py.detach(|| batch.gradient(&cone, &mut out));
+    PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
-fn flat(gradient: &Gradient) -> [f64; 22] {
-    let mut row = [0.0; 22];
-    row[0] = gradient.value;
-    let vectors = gradient.contacts.iter().chain(&gradient.normals);
-    for (slot, vector) in row[1..]
-        .chunks_exact_mut(3)
-        .zip(vectors.chain([&gradient.center_of_mass]))
-    {
-        slot.copy_from_slice(&vector.to_array());
-    }
-    row
+/// Whether Q_l ≥ threshold, of n grasps.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+fn quality_at_least<'py>(
+    py: Python<'py>,
+    contacts: PyReadonlyArray3<'py, f64>,
+    normals: PyReadonlyArray3<'py, f64>,
+    center_of_mass: PyReadonlyArray2<'py, f64>,
+    threshold: f64,
+    friction: f64,
+    edges: usize,
+    torsion: f64,
+) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    let cone = cone(friction, edges, torsion)?;
+    let batch = batch(&contacts, &normals, &center_of_mass)?;
+    let mut out = vec![false; batch.centers.len()];
+    py.detach(|| batch.is_at_least(&cone, threshold, &mut out));
+    Ok(PyArray1::from_vec(py, out))
+}
+
+/// Index and Q_l of the best of n grasps, or of the worst.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+fn extreme_quality(
+    py: Python<'_>,
+    contacts: PyReadonlyArray3<'_, f64>,
+    normals: PyReadonlyArray3<'_, f64>,
+    center_of_mass: PyReadonlyArray2<'_, f64>,
+    friction: f64,
+    edges: usize,
+    torsion: f64,
+    largest: bool,
+) -> PyResult<Option<(usize, f64)>> {
+    let cone = cone(friction, edges, torsion)?;
+    let batch = batch(&contacts, &normals, &center_of_mass)?;
+    Ok(py.detach(|| {
+        if largest {
+            batch.largest(&cone)
+        } else {
+            batch.smallest(&cone)
+        }
+    }))
+}
+
+/// Bounds of the quality with circular cones of n grasps.
+#[pyfunction]
+fn circular_quality<'py>(
+    py: Python<'py>,
+    contacts: PyReadonlyArray3<'py, f64>,
+    normals: PyReadonlyArray3<'py, f64>,
+    center_of_mass: PyReadonlyArray2<'py, f64>,
+    friction: f64,
+    tolerance: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let cone = cone(friction, 3, 0.0)?;
+    let batch = batch(&contacts, &normals, &center_of_mass)?;
+    let mut out = vec![[0.0; 2]; batch.centers.len()];
+    py.detach(|| batch.circular(&cone, tolerance, &mut out));
+    table(py, out)
+}
+
+/// Q_l or Q'_l of one grasp by the expanding polytope, and the normal of the nearest facet.
+#[pyfunction]
+fn weakest(
+    contacts: PyReadonlyArray2<'_, f64>,
+    normals: PyReadonlyArray2<'_, f64>,
+    center_of_mass: [f64; 3],
+    friction: f64,
+    edges: usize,
+    torsion: f64,
+    each: bool,
+) -> PyResult<(f64, [f64; 6])> {
+    let cone = cone(friction, edges, torsion)?;
+    let contacts = single(&contacts, &normals)?;
+    let weakest = Evaluator::new(&cone).weakest(&contacts, center_of_mass.into(), norm(each));
+    Ok((weakest.quality, weakest.direction))
+}
+
+/// The contacts of one grasp.
+fn single(
+    contacts: &PyReadonlyArray2<'_, f64>,
+    normals: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<Contact>> {
+    Ok(vectors(contacts.as_slice()?)
+        .iter()
+        .zip(vectors(normals.as_slice()?))
+        .map(|(&point, &normal)| Contact {
+            point: point.into(),
+            normal: normal.into(),
+        })
+        .collect())
 }
 
 /// Rows of equal length as an array.
@@ -233,14 +327,7 @@ fn best_triples<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<([usize; 3], f64)>> {
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
-    let contacts: Vec<Contact> = vectors(contacts.as_slice()?)
-        .iter()
-        .zip(vectors(normals.as_slice()?))
-        .map(|(&point, &normal)| Contact {
-            point: point.into(),
-            normal: normal.into(),
-        })
-        .collect();
+    let contacts = single(&contacts, &normals)?;
     let mut failure = None;
     let result = py.detach(|| {
         let report = |done, total| {
@@ -319,7 +406,7 @@ fn synthesize<'py>(
 mod _core {
     #[pymodule_export]
     use super::{
-        GraspModuliError, Surface, best_triples, combine, quality, quality_gradient, sample_points,
-        synthesize,
+        GraspModuliError, Surface, best_triples, circular_quality, combine, extreme_quality,
+        quality, quality_at_least, quality_gradient, sample_points, synthesize, weakest,
     };
 }

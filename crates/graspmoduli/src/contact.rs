@@ -21,6 +21,7 @@ pub struct Contact {
 #[derive(Debug, Clone)]
 pub struct FrictionCone {
     friction: f64,
+    torsion: f64,
     /// (cos φ_j, sin φ_j), already multiplied by μ.
     pub(crate) edges: Vec<[f64; 2]>,
     /// (cos ψ_j, sin ψ_j).
@@ -30,9 +31,9 @@ pub struct FrictionCone {
 }
 
 impl FrictionCone {
-    /// The cone of friction coefficient μ = `friction` with l = `edges` edges.
+    /// The cone of friction coefficient μ = `friction` with l = `edges` edges; a ray for μ = 0.
     pub fn new(friction: f64, edges: usize) -> Result<Self, Error> {
-        if !(friction.is_finite() && friction > 0.0) {
+        if !(friction.is_finite() && friction >= 0.0) {
             return Err(Error::Friction(friction));
         }
         if edges < 3 {
@@ -45,12 +46,42 @@ impl FrictionCone {
         // The paper counts j = 1…l; j = 0 and j = l are the same edge, so the set is the same.
         Ok(Self {
             friction,
+            torsion: 0.0,
             edges: (0..edges)
                 .map(|j| at(j as f64).map(|x| friction * x))
                 .collect(),
             rays: (0..edges).map(|j| at(j as f64 + 0.5)).collect(),
             ray_height: -friction * (TAU / (2.0 * edges as f64)).cos(),
         })
+    }
+
+    /// The same cone of a soft finger: with normal force 1 it can also apply a torque about the
+    /// normal of up to γ = `torsion`, a length. Sliding and spinning friction trade off linearly:
+    /// the wrenches (n, r × n ± γ n) join those of the edges.
+    pub fn soft(self, torsion: f64) -> Result<Self, Error> {
+        if !(torsion.is_finite() && torsion >= 0.0) {
+            return Err(Error::Torsion(torsion));
+        }
+        Ok(Self { torsion, ..self })
+    }
+
+    /// Torsional friction coefficient γ, a length; 0 for a hard finger.
+    pub fn torsion(&self) -> f64 {
+        self.torsion
+    }
+
+    /// Wrenches per contact: the edges, and two more for a soft finger.
+    pub(crate) fn generators(&self) -> usize {
+        self.len() + if self.torsion > 0.0 { 2 } else { 0 }
+    }
+
+    /// Force in the contact frame and torque about the normal of a generator.
+    pub(crate) fn generator(&self, index: usize) -> ([f64; 3], f64) {
+        match self.edges.get(index) {
+            Some(&[x, y]) => ([x, y, 1.0], 0.0),
+            None if index == self.len() => ([0.0, 0.0, 1.0], self.torsion),
+            None => ([0.0, 0.0, 1.0], -self.torsion),
+        }
     }
 
     /// Friction coefficient μ.
@@ -71,7 +102,7 @@ impl FrictionCone {
     /// Edge j of the cone about the normal of `frame`.
     pub fn edge(&self, frame: &Frame, j: usize) -> DVec3 {
         let [x, y] = self.edges[j];
-        frame.tangents[0] * x + frame.tangents[1] * y + frame.normal
+        frame.turn([x, y, 1.0])
     }
 }
 
@@ -113,6 +144,12 @@ impl Frame {
             normal,
             k,
         }
+    }
+
+    /// R(n) (a, b, c).
+    #[inline(always)]
+    pub(crate) fn turn(&self, [a, b, c]: [f64; 3]) -> DVec3 {
+        self.tangents[0] * a + self.tangents[1] * b + self.normal * c
     }
 
     /// Gradient with respect to n, tangent to the sphere, of ⟨p, R(n) (a, b, c)⟩.

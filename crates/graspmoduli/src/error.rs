@@ -5,12 +5,12 @@ use std::fmt;
 /// Misuse of the library. A grasp that is not force closure is *not* an error: its quality is 0.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Error {
-    /// The friction coefficient is not a positive finite number.
+    /// The friction coefficient is negative or not finite.
     Friction(f64),
     /// Fewer than three friction-cone edges.
     Edges(usize),
-    /// Only up to three contacts are supported so far.
-    Contacts(usize),
+    /// The torsional friction coefficient is negative or not finite.
+    Torsion(f64),
     /// A surface needs at least four coefficients along its height and four around it.
     CoefficientShape(usize, usize),
     /// The heights do not satisfy bottom < top.
@@ -31,12 +31,15 @@ impl fmt::Display for Error {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Error::Friction(got) => {
-                write!(out, "friction must be a positive finite number, got {got}")
+                write!(
+                    out,
+                    "friction must be a finite number, 0 or positive, got {got}"
+                )
             }
             Error::Edges(got) => write!(out, "edges must be at least 3, got {got}"),
-            Error::Contacts(got) => write!(
+            Error::Torsion(got) => write!(
                 out,
-                "contacts must be at most 3 per grasp in this version, got {got}"
+                "torsion must be a finite number, 0 or positive, got {got}"
             ),
             Error::CoefficientShape(rows, columns) => write!(
                 out,

@@ -25,42 +25,45 @@ pub(crate) fn shortest_step<const D: usize, const N: usize>(
         .collect();
     let mut target = [0.0; N];
     target[D] = 1.0;
-    let residual = residual(&columns, target);
+    let residual = residual(&columns, &nonnegative(&columns, target), target);
     (residual[D] < -1e-10).then(|| std::array::from_fn(|i| -residual[i] / residual[D]))
 }
 
-/// Eλ − f for the λ ≥ 0 that makes it shortest.
-fn residual<const N: usize>(columns: &[[f64; N]], target: [f64; N]) -> [f64; N] {
+/// Eλ − f.
+fn residual<const N: usize>(columns: &[[f64; N]], weights: &[f64], target: [f64; N]) -> [f64; N] {
+    let mut r = target.map(|x| -x);
+    for (column, weight) in columns.iter().zip(weights) {
+        for i in 0..N {
+            r[i] += column[i] * weight;
+        }
+    }
+    r
+}
+
+/// The λ ≥ 0 that makes Eλ − f shortest; at most N are positive. Columns should be about as long
+/// as one another and as f.
+pub(crate) fn nonnegative<const N: usize>(columns: &[[f64; N]], target: [f64; N]) -> Vec<f64> {
     let mut weights = vec![0.0; columns.len()];
     let mut passive: Vec<usize> = Vec::with_capacity(N);
-    let current = |weights: &[f64]| {
-        let mut r = target.map(|x| -x);
-        for (column, weight) in columns.iter().zip(weights) {
-            for i in 0..N {
-                r[i] += column[i] * weight;
-            }
-        }
-        r
-    };
     // Each round lowers the residual; the bound only guards against cycling by rounding.
     for _ in 0..4 * (columns.len() + N) {
-        let r = current(&weights);
+        let r = residual(columns, &weights, target);
         let candidate = (0..columns.len())
             .filter(|k| !passive.contains(k))
             .map(|k| (k, -dot(&columns[k], &r)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((entering, slope)) = candidate else {
-            return r;
+            return weights;
         };
         if slope <= TOLERANCE || passive.len() == N {
-            return r;
+            return weights;
         }
         passive.push(entering);
         loop {
             let Some(trial) = least_squares(columns, &passive, target) else {
                 // Dependent on the others: it cannot lower the residual.
                 passive.retain(|&k| k != entering);
-                return current(&weights);
+                return weights;
             };
             // As far towards the trial as all weights stay positive.
             let mut share = 1.0;
@@ -83,7 +86,7 @@ fn residual<const N: usize>(columns: &[[f64; N]], target: [f64; N]) -> [f64; N] 
             }
         }
     }
-    current(&weights)
+    weights
 }
 
 /// Least squares on the chosen columns, by modified Gram–Schmidt; `None` if they are dependent.

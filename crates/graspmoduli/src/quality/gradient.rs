@@ -1,49 +1,73 @@
 //! Exact gradients of Q_l.
 //!
 //! Let v be the unit normal of the facet of the wrench hull that is nearest to the origin, and
-//! Q v = Σ α_k w_k its foot point in terms of active wrenches, Σ α_k = 1. Then
-//! dQ = Σ α_k ⟨v, dw_k⟩. With F_i = Σ α f the contact forces of the foot point and V_i the
-//! velocity of contact i under v: ∂Q/∂c_i = F_i × v_ω, ∂Q/∂z = −Σ ∂Q/∂c_i, and ∂Q/∂n_i is the
-//! gradient of ⟨V_i, R(n_i) g_i⟩ with g_i = R(n_i)ᵀ F_i held fixed.
+//! Q v = Σ α_k w_k its foot point in terms of active wrenches, Σ α_k = 1, α ≥ 0. Then
+//! dQ = Σ α_k ⟨v, dw_k⟩. With F_i = Σ α f the contact forces of the foot point, s_i its torsional
+//! torques and V_i the velocity of contact i under v: ∂Q/∂c_i = F_i × v_ω, ∂Q/∂z = −Σ ∂Q/∂c_i, and
+//! ∂Q/∂n_i is the gradient of ⟨V_i, R(n_i) g_i⟩ + s_i ⟨v_ω, n_i⟩ with g_i = R(n_i)ᵀ F_i held fixed.
 
 use super::Twist;
+use super::polytope::dot;
 use super::three_contacts::{Active, Vertex};
+use super::wrenches::Wrenches;
 use crate::contact::{Contact, Frame, FrictionCone};
+use crate::nnls::nonnegative;
 use glam::DVec3;
 
-/// Q_l of a grasp with three contacts, and its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Wrenches this near to the facet (relative to its distance) take part in its foot point.
+const ON_THE_FACET: f64 = 1e-9;
+/// Weights above minus this are not negative but for rounding.
+const NEGATIVE: f64 = 1e-9;
+
+/// Q_l of a grasp and its derivatives.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Gradient {
     /// Q_l.
     pub value: f64,
     /// ∂Q/∂c_i.
-    pub contacts: [DVec3; 3],
+    pub contacts: Vec<DVec3>,
     /// ∂Q/∂n_i, tangent to the sphere at n_i.
-    pub normals: [DVec3; 3],
+    pub normals: Vec<DVec3>,
     /// ∂Q/∂z.
     pub center_of_mass: DVec3,
 }
 
 impl Gradient {
-    /// Of a grasp that is not force closure: Q is 0, and so is the gradient that is reported.
-    pub const ZERO: Self = Self {
-        value: 0.0,
-        contacts: [DVec3::ZERO; 3],
-        normals: [DVec3::ZERO; 3],
-        center_of_mass: DVec3::ZERO,
-    };
+    /// Numbers per gradient of a grasp with m contacts in one piece of memory: value, contacts,
+    /// normals, centre of mass.
+    pub fn width(m: usize) -> usize {
+        6 * m + 4
+    }
+
+    pub(super) fn from_row(row: &[f64]) -> Self {
+        let vectors: Vec<DVec3> = row[1..].as_chunks().0.iter().map(|&v| v.into()).collect();
+        let m = vectors.len() / 2;
+        Self {
+            value: row[0],
+            contacts: vectors[..m].to_vec(),
+            normals: vectors[m..2 * m].to_vec(),
+            center_of_mass: vectors[2 * m],
+        }
+    }
 }
 
-/// Gradient of the distance from the origin to the facet that belongs to a vertex of P.
+/// Forces in the contact frame and torsional torques of a foot point, per contact.
+type Share = ([f64; 3], f64);
+
+/// Distance of the facet that belongs to a vertex of P and its gradient, into `row`; false if the
+/// foot point is not in the span of the facet to rounding.
 ///
-/// Where several facets are nearest, this is the derivative of one of them. `None` where the six
-/// active wrenches are dependent to rounding.
-pub(crate) fn of_facet(
+/// `nearest` says that the facet is the nearest to the origin: then weights that came out negative,
+/// because more wrenches than six are active, are found anew among all of them.
+#[inline(always)]
+pub(super) fn of_vertex(
     vertex: &Vertex,
     contacts: &[Contact; 3],
     center: DVec3,
     cone: &FrictionCone,
-) -> Option<Gradient> {
+    nearest: bool,
+    row: &mut [f64],
+) -> bool {
     let l = cone.len();
     let value = 1.0 / vertex.norm_squared.sqrt();
     let direction = vertex.twist.map(|x| x * value);
@@ -65,41 +89,135 @@ pub(crate) fn of_facet(
         let torque = (contacts[i].point - center).cross(force);
         [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     });
-    let weights = solve(&wrenches, direction.map(|x| x * value))?;
-    let mut local = [DVec3::ZERO; 3];
-    for ((i, j), weight) in active.into_iter().zip(weights) {
-        let [x, y] = cone.edges[j];
-        local[i] += DVec3::new(x, y, 1.0) * weight;
+    let rows = std::array::from_fn(|c| wrenches.map(|w| w[c]));
+    let mut shares: [Share; 3] = Default::default();
+    let weights = solve(rows, direction.map(|x| x * value));
+    if let Some(weights) = weights {
+        for ((i, j), weight) in active.into_iter().zip(weights) {
+            let [x, y] = cone.edges[j];
+            let force = &mut shares[i].0;
+            *force = [
+                force[0] + x * weight,
+                force[1] + y * weight,
+                force[2] + weight,
+            ];
+        }
     }
-    let linear = DVec3::new(direction[0], direction[1], direction[2]);
-    let angular = DVec3::new(direction[3], direction[4], direction[5]);
-    let mut gradient = Gradient {
-        value,
-        ..Gradient::ZERO
-    };
-    for i in 0..3 {
-        let Frame {
-            tangents: [t1, t2],
-            normal,
-            ..
-        } = frames[i];
-        let force = t1 * local[i].x + t2 * local[i].y + normal * local[i].z;
-        let velocity = linear + angular.cross(contacts[i].point - center);
-        gradient.contacts[i] = force.cross(angular);
-        gradient.center_of_mass -= gradient.contacts[i];
-        gradient.normals[i] = frames[i].gradient(velocity, local[i].to_array());
+    // The apex's three edges may have negative weights while its force is within the cone.
+    let within = weights.is_some()
+        && (!nearest
+            || shares.iter().all(|([x, y, z], _)| {
+                cone.rays
+                    .iter()
+                    .all(|[a, b]| a * x + b * y + cone.ray_height * z <= NEGATIVE)
+            }));
+    if !within {
+        let found = nearest && {
+            let mut all = Wrenches::new();
+            all.set(contacts, center, cone, super::Norm::Sum);
+            foot_point(&all, &direction, value, cone, &mut shares)
+        };
+        if !found && weights.is_none() {
+            return false;
+        }
     }
-    Some(gradient)
+    differentiate(&direction, value, contacts, center, &shares, row);
+    true
 }
 
-/// Σ_k weights_k columns_k = right, by Gaussian elimination with partial pivoting.
-fn solve(columns: &[Twist; 6], right: Twist) -> Option<Twist> {
-    let mut rows: [[f64; 7]; 6] = std::array::from_fn(|r| {
-        std::array::from_fn(|c| if c < 6 { columns[c][r] } else { right[r] })
+/// The foot point of the nearest facet, with normal `direction` in the object frame, in terms of
+/// all wrenches on it.
+pub(super) fn foot_point(
+    wrenches: &Wrenches,
+    direction: &Twist,
+    value: f64,
+    cone: &FrictionCone,
+    shares: &mut [Share],
+) -> bool {
+    let scale = wrenches.scale;
+    let twist: Twist = std::array::from_fn(|i| {
+        if i < 3 {
+            direction[i]
+        } else {
+            direction[i] * scale
+        }
     });
+    let (mut columns, mut active) = (Vec::new(), Vec::new());
+    for (index, wrench) in wrenches.all.iter().enumerate() {
+        if dot(wrench, &twist) >= value * (1.0 - ON_THE_FACET) {
+            columns.push(*wrench);
+            active.push(wrenches.origin(index));
+        }
+    }
+    let foot: Twist = std::array::from_fn(|i| {
+        value
+            * if i < 3 {
+                direction[i]
+            } else {
+                direction[i] / scale
+            }
+    });
+    let weights = nonnegative(&columns, foot);
+    let total: f64 = weights.iter().sum();
+    if (total - 1.0).abs() > 1e-6 {
+        return false;
+    }
+    shares.fill(Share::default());
+    for ((i, k), weight) in active.into_iter().zip(weights) {
+        let ([x, y, z], spin) = cone.generator(k);
+        let (force, torque) = &mut shares[i];
+        *force = [
+            force[0] + x * weight,
+            force[1] + y * weight,
+            force[2] + z * weight,
+        ];
+        *torque += spin * weight;
+    }
+    true
+}
+
+/// dQ = Σ α ⟨v, dw⟩ into `row`, whose layout is that of [`Gradient::width`].
+#[inline(always)]
+pub(super) fn differentiate(
+    direction: &Twist,
+    value: f64,
+    contacts: &[Contact],
+    center: DVec3,
+    shares: &[Share],
+    row: &mut [f64],
+) {
+    let m = contacts.len();
+    let linear = DVec3::new(direction[0], direction[1], direction[2]);
+    let angular = DVec3::new(direction[3], direction[4], direction[5]);
+    let mut total = DVec3::ZERO;
+    row[0] = value;
+    let vectors = row[1..].as_chunks_mut::<3>().0;
+    for (i, (contact, (local, spin))) in contacts.iter().zip(shares).enumerate() {
+        let frame = Frame::new(contact.normal);
+        let velocity = linear + angular.cross(contact.point - center);
+        let along = frame.turn(*local).cross(angular);
+        let free = angular * *spin;
+        let spinning = free - contact.normal * free.dot(contact.normal);
+        vectors[i] = along.to_array();
+        vectors[m + i] = (frame.gradient(velocity, *local) + spinning).to_array();
+        total -= along;
+    }
+    vectors[2 * m] = total.to_array();
+}
+
+/// The x with ⟨rows_k, x⟩ = right_k, by Gaussian elimination with partial pivoting; `None` if the
+/// rows are dependent.
+#[inline(always)]
+pub(super) fn solve(rows: [Twist; 6], right: Twist) -> Option<Twist> {
+    let mut rows: [[f64; 7]; 6] =
+        std::array::from_fn(|r| std::array::from_fn(|c| if c < 6 { rows[r][c] } else { right[r] }));
     for step in 0..6 {
-        let pivot =
-            (step..6).max_by(|&a, &b| rows[a][step].abs().total_cmp(&rows[b][step].abs()))?;
+        let mut pivot = step;
+        for row in step + 1..6 {
+            if rows[row][step].abs() > rows[pivot][step].abs() {
+                pivot = row;
+            }
+        }
         rows.swap(step, pivot);
         let head = rows[step];
         // Torques carry the unit of length, so only an exact zero is independent of it.
@@ -113,10 +231,10 @@ fn solve(columns: &[Twist; 6], right: Twist) -> Option<Twist> {
             }
         }
     }
-    let mut weights = [0.0; 6];
+    let mut x = [0.0; 6];
     for step in (0..6).rev() {
-        let known: f64 = (step + 1..6).map(|c| rows[step][c] * weights[c]).sum();
-        weights[step] = (rows[step][6] - known) / rows[step][step];
+        let known: f64 = (step + 1..6).map(|c| rows[step][c] * x[c]).sum();
+        x[step] = (rows[step][6] - known) / rows[step][step];
     }
-    weights.iter().all(|w| w.is_finite()).then_some(weights)
+    x.iter().all(|x| x.is_finite()).then_some(x)
 }

@@ -64,6 +64,8 @@ pub(super) enum Question {
     Longest,
     /// The longest, or any one longer than this (by its square).
     LongestUpTo(f64),
+    /// The longest that is longer than this (by its square).
+    LongerThan(f64),
     /// All that are longer than this (by its square), but not more than so many.
     All(f64, usize),
 }
@@ -121,6 +123,20 @@ impl Kernel {
         let limit = 1.0 / (threshold * threshold);
         self.ask(contacts, center, Question::LongestUpTo(limit))
             .then(|| self.found[0])
+    }
+
+    /// The longest twist if it is longer than 1/`threshold`: Q < `threshold`; `Some(None)` if Q is
+    /// not below the threshold, `None` where the grasp is not force closure.
+    #[inline]
+    pub fn longest_above(
+        &mut self,
+        contacts: &[Contact; 3],
+        center: DVec3,
+        threshold: f64,
+    ) -> Option<Option<Vertex>> {
+        let limit = 1.0 / (threshold * threshold);
+        self.ask(contacts, center, Question::LongerThan(limit))
+            .then(|| self.found.first().copied())
     }
 
     /// Vertices of P that belong to the facets of the hull within `distance` of the origin, at
@@ -243,13 +259,13 @@ impl WithSimd for Ask<'_> {
         }
         kernel.plane.set_up_rays(contacts, center);
         let mut limit = match question {
-            Question::All(limit, _) => limit,
+            Question::All(limit, _) | Question::LongerThan(limit) => limit,
             _ => 0.0,
         };
         if kernel.apexes(simd, question, &mut limit).is_continue() {
             let _ = kernel.rays(simd, question, &mut limit);
         }
-        !kernel.found.is_empty()
+        matches!(question, Question::LongerThan(_)) || !kernel.found.is_empty()
     }
 }
 
