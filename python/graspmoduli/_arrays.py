@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import _core
 from ._core import GraspModuliError
 
 Floats = NDArray[np.float64]
@@ -19,16 +20,22 @@ UNIT_TOLERANCE = 1e-4
 
 def floats(name: str, value: ArrayLike) -> Floats:
     """``value`` as a contiguous float64 array of finite numbers."""
+    return finite(name, numbers(name, value))
+
+
+def numbers(name: str, value: ArrayLike) -> Floats:
+    """``value`` as a contiguous float64 array."""
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise GraspModuliError(f"{name} must be an array of numbers, got {_brief(value)}") from None
     # ascontiguousarray makes a 0-d array 1-d.
-    array = array.reshape(np.shape(value))
-    # A sum is finite only if all its terms are; large ones are looked at one by one.
-    with np.errstate(over="ignore", invalid="ignore"):
-        suspicious = not np.isfinite(array.sum())
-    if suspicious and not np.isfinite(array).all():
+    return array.reshape(np.shape(value))
+
+
+def finite(name: str, array: Floats) -> Floats:
+    """``array`` if all of it is finite."""
+    if not np.isfinite(array).all():
         index = np.argwhere(~np.isfinite(array))[0]
         where = f" at index {tuple(index.tolist())}" if array.ndim else ""
         raise GraspModuliError(f"{name} must be finite, got {array[tuple(index)]}{where}")
@@ -36,23 +43,16 @@ def floats(name: str, value: ArrayLike) -> Floats:
 
 
 def vectors(name: str, value: ArrayLike, shape: str) -> Floats:
-    """An array whose last axis has length 3; ``shape`` says what was wanted."""
-    array = floats(name, value)
-    wanted = shape.count(",") + (0 if "..." in shape else 1)
-    wrong_rank = array.ndim < wanted if "..." in shape else array.ndim != wanted
-    if wrong_rank or array.shape[-1] != 3:
+    """An array with at least as many axes as ``shape`` names, the last of length 3."""
+    array = numbers(name, value)
+    if array.ndim < shape.count(",") or array.shape[-1] != 3:
         raise GraspModuliError(f"{name} must have shape {shape}, got {array.shape}")
     return array
 
 
 def unit(name: str, array: Floats) -> Floats:
     """Normals made exactly unit, if they nearly are."""
-    squares = np.einsum("...i,...i->...", array, array)
-    # What is unit to rounding keeps its bits.
-    off = np.abs(squares - 1.0)
-    if off.max(initial=0.0) < 2e-15:
-        return array
-    lengths = np.sqrt(squares)
+    lengths = np.linalg.norm(array, axis=-1)
     wrong = ~(np.abs(lengths - 1.0) <= UNIT_TOLERANCE)
     if wrong.any():
         index = np.argwhere(wrong)[0]
@@ -61,7 +61,9 @@ def unit(name: str, array: Floats) -> Floats:
             f"{name} must be unit vectors, got one of length "
             f"{float(lengths[tuple(index)]):.6g}{where}"
         )
-    return np.where(off[..., None] < 2e-15, array, array / lengths[..., None])
+    # What is unit to rounding keeps its bits.
+    exact = np.abs(lengths - 1.0) < 1e-15
+    return np.where(exact[..., None], array, array / lengths[..., None])
 
 
 def grasps(
@@ -85,7 +87,11 @@ def grasps(
             "contacts, normals and center_of_mass must have batch shapes that broadcast, "
             f"got {points.shape}, {directions.shape} and {center.shape}"
         ) from None
-    directions = unit("normals", directions)
+    # One quick look at all of it; what it does not like is looked at with care.
+    if not _core.is_clean(points, directions, center):
+        finite("contacts", points)
+        directions = unit("normals", finite("normals", directions))
+        finite("center_of_mass", center)
     m = points.shape[-2]
 
     def flat(array: Floats, tail: tuple[int, ...]) -> Floats:

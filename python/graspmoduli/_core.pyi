@@ -10,6 +10,7 @@ Floats = NDArray[np.float64]
 class GraspModuliError(ValueError):
     """Wrong input: names the argument, what was wanted and what came."""
 
+def is_clean(points: Floats, normals: Floats, centers: Floats) -> bool: ...
 def quality(
     contacts: Floats,
     normals: Floats,

@@ -376,7 +376,7 @@ impl Batch<'_> {
         (0..self.centers.len().div_ceil(CHUNK))
             .into_par_iter()
             .map_init(
-                || (Evaluator::new(cone), Vec::new()),
+                || (Evaluator::new(cone), self.blank()),
                 |(evaluator, contacts), chunk| {
                     let end = self.centers.len().min((chunk + 1) * CHUNK);
                     (chunk * CHUNK..end)
@@ -395,18 +395,24 @@ impl Batch<'_> {
         self.points.len() / self.centers.len().max(1)
     }
 
+    /// Grasp `index`, its contacts written over the m in `contacts`.
     #[inline]
-    fn grasp(&self, index: usize, contacts: &mut Vec<Contact>) -> DVec3 {
-        let m = self.contacts_per_grasp();
-        let own = index * m..(index + 1) * m;
-        contacts.clear();
-        contacts.extend(self.points[own.clone()].iter().zip(&self.normals[own]).map(
-            |(&point, &normal)| Contact {
-                point: point.into(),
-                normal: normal.into(),
-            },
-        ));
+    fn grasp(&self, index: usize, contacts: &mut [Contact]) -> DVec3 {
+        let own = index * contacts.len()..(index + 1) * contacts.len();
+        let pairs = self.points[own.clone()].iter().zip(&self.normals[own]);
+        for (contact, (&point, &normal)) in contacts.iter_mut().zip(pairs) {
+            contact.point = point.into();
+            contact.normal = normal.into();
+        }
         self.centers[index].into()
+    }
+
+    fn blank(&self) -> Vec<Contact> {
+        let contact = Contact {
+            point: DVec3::ZERO,
+            normal: DVec3::Z,
+        };
+        vec![contact; self.contacts_per_grasp()]
     }
 
     fn each<T: Send>(
@@ -417,7 +423,7 @@ impl Batch<'_> {
         evaluate: impl Fn(&mut Evaluator, &[Contact], DVec3, &mut [T]) + Sync,
     ) {
         let run = |evaluator: &mut Evaluator, chunk: usize, out: &mut [T]| {
-            let mut contacts = Vec::with_capacity(self.contacts_per_grasp());
+            let mut contacts = self.blank();
             for (offset, slot) in out.chunks_exact_mut(width).enumerate() {
                 let center = self.grasp(chunk * CHUNK + offset, &mut contacts);
                 evaluate(evaluator, &contacts, center, slot);

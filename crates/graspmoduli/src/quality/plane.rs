@@ -240,111 +240,124 @@ impl Plane {
         let [e12, e13, e23] = self.along;
         // Coordinates of a force at each contact: (t12, t13), (t23, t12), (t13, t23).
         let coordinates = [[e13, -e12], [-e12, -e23], [-e23, e13]];
-        let mut low = [[DVec2::ZERO; 4]; 3];
-        let mut high = [[DVec2::ZERO; 4]; 3];
+        // The rays of the wedges, mirrored into the first quadrant from each of the four.
+        let mut rays = [[0.0; 12]; 4];
         for contact in 0..3 {
             let Some(wedge) = self.wedge(contact) else {
                 return false;
             };
             let [p, q] = coordinates[contact];
-            let wedge = wedge.map(|f| DVec2::new(f.perp_dot(p), f.perp_dot(q)));
-            for quadrant in 0..4 {
-                let (sx, sy) = (sign(quadrant & 1), sign(quadrant >> 1));
-                (low[contact][quadrant], high[contact][quadrant]) = ratio_bounds(wedge, sx, sy);
+            let [a, b] = wedge.map(|f| DVec2::new(f.perp_dot(p), f.perp_dot(q)));
+            // Mirroring once turns counterclockwise into clockwise: the rays swap places.
+            let mirrored = [
+                [a.x, -b.x, b.x, -a.x],
+                [a.y, b.y, -b.y, -a.y],
+                [b.x, -a.x, a.x, -b.x],
+                [b.y, a.y, -a.y, -b.y],
+            ];
+            for (row, values) in rays.iter_mut().zip(mirrored) {
+                row[4 * contact..4 * contact + 4].copy_from_slice(&values);
             }
         }
-        let mut closed = false;
-        for octant in 0..8 {
-            let (s12, s13, s23) = (octant & 1, (octant >> 1) & 1, octant >> 2);
-            let (i, j, k) = (s12 | s13 << 1, s23 | s12 << 1, s13 | s23 << 1);
-            // Ratios as (denominator, numerator).
-            let low = low[0][i] * low[1][j] * low[2][k];
-            let high = high[0][i] * high[1][j] * high[2][k];
-            closed |= (low.y < low.x * (1.0 - DEGENERATE)) & (high.y * (1.0 - DEGENERATE) > high.x);
+        let bounds = ratio_bounds(&rays);
+        let mut products = [[1.0; 8]; 4];
+        for row in 0..4 {
+            for octant in 0..8 {
+                let mut product = 1.0;
+                for contact in 0..3 {
+                    product *= bounds[row][4 * contact + QUADRANTS[contact][octant]];
+                }
+                products[row][octant] = product;
+            }
         }
-        closed
+        let [low_x, low_y, high_x, high_y] = products;
+        let mut closed = 0u32;
+        for octant in 0..8 {
+            let below = low_y[octant] < low_x[octant] * (1.0 - DEGENERATE);
+            let above = high_y[octant] * (1.0 - DEGENERATE) > high_x[octant];
+            closed |= u32::from(below & above);
+        }
+        closed != 0
     }
 
-    /// The two directions in which the boundary of a cone crosses the plane, counterclockwise.
+    /// The two directions, of any length, in which the boundary of a cone crosses the plane,
+    /// counterclockwise.
     #[inline(always)]
     fn wedge(&self, contact: usize) -> Option<[DVec2; 2]> {
         let table = &self.sides[contact].edge;
         let last = self.edges - 1;
         let mut below = u32::from(at(table, last)[2] < 0.0);
-        let mut crossings = [DVec2::ZERO; 2];
+        // Where the boundary comes up through the plane, and where it goes down.
         let (mut ups, mut downs) = (0, 0);
-        // The padding's zeros change neither.
-        let (mut highest, mut lowest) = (0.0, 0.0);
+        let (mut up_to, mut down_to) = (0, 0);
+        let (mut above_somewhere, mut below_somewhere) = (0, 0);
         for (block, [_, _, row]) in table.iter().enumerate() {
-            let mut negative = 0u32;
+            let (mut negative, mut high, mut low) = (0u32, 0u32, 0u32);
             for lane in 0..LANES {
                 negative |= u32::from(row[lane] < 0.0) << lane;
-                highest = if row[lane] > highest {
-                    row[lane]
-                } else {
-                    highest
-                };
-                lowest = if row[lane] < lowest {
-                    row[lane]
-                } else {
-                    lowest
-                };
+                high |= u32::from(row[lane] > DEGENERATE) << lane;
+                low |= u32::from(row[lane] < -DEGENERATE) << lane;
             }
+            // The padding's zeros are neither.
+            above_somewhere |= high;
+            below_somewhere |= low;
             let count = LANES.min(self.edges - block * LANES);
             let before = negative << 1 | below;
             let valid = (1 << count) - 1;
-            let up = before & !negative & valid;
-            let mut changes = (before ^ negative) & valid;
+            let (up, down) = (before & !negative & valid, !before & negative & valid);
             ups += up.count_ones();
-            downs += (changes & !up).count_ones();
-            while changes != 0 {
-                let lane = changes.trailing_zeros() as usize;
-                changes &= changes - 1;
-                let to = block * LANES + lane;
-                let from = if to == 0 { last } else { to - 1 };
-                let ([x0, y0, z0], [x1, y1, z1]) = (at(table, from), at(table, to));
-                let (low, high) = (z0.abs(), z1.abs());
-                let point = DVec2::new(x0, y0) * high + DVec2::new(x1, y1) * low;
-                crossings[usize::from(up >> lane & 1 == 0)] = point / (low + high);
+            downs += down.count_ones();
+            if up != 0 {
+                up_to = block * LANES + up.trailing_zeros() as usize;
+            }
+            if down != 0 {
+                down_to = block * LANES + down.trailing_zeros() as usize;
             }
             below = negative >> (count - 1);
         }
-        if ups != 1 || downs != 1 || highest <= DEGENERATE || lowest >= -DEGENERATE {
+        if (ups != 1) | (downs != 1) | (above_somewhere == 0) | (below_somewhere == 0) {
             return None;
         }
-        if crossings[0].perp_dot(crossings[1]) < 0.0 {
-            crossings.swap(0, 1);
-        }
-        Some(crossings)
+        let crossing = |to: usize| {
+            let from = if to == 0 { last } else { to - 1 };
+            let ([x0, y0, z0], [x1, y1, z1]) = (at(table, from), at(table, to));
+            DVec2::new(x0, y0) * z1.abs() + DVec2::new(x1, y1) * z0.abs()
+        };
+        let (a, b) = (crossing(up_to), crossing(down_to));
+        Some(if a.perp_dot(b) < 0.0 { [b, a] } else { [a, b] })
     }
 }
 
-fn sign(bit: usize) -> f64 {
-    if bit == 0 { 1.0 } else { -1.0 }
-}
+/// The quadrant of each contact's coordinates (bit 0: x < 0, bit 1: y < 0) for each choice of signs
+/// of (t₁₂, t₁₃, t₂₃), bit 0 to bit 2.
+const QUADRANTS: [[usize; 8]; 3] = [
+    [0, 1, 2, 3, 0, 1, 2, 3],
+    [0, 2, 0, 2, 1, 3, 1, 3],
+    [0, 0, 1, 1, 2, 2, 3, 3],
+];
 
-/// Bounds on |y/x| within a wedge (given by its rays, counterclockwise) and the open quadrant
-/// with these signs of x and y, each as (denominator, numerator); where they do not meet, the
-/// lower bound is infinite. Without branches: they would be mispredicted.
+/// Bounds on y/x within wedges and the open first quadrant: denominator and numerator of the lower
+/// bound and of the upper one. Where they do not meet, the lower bound is infinite.
+///
+/// A wedge is given by its rays a and b, counterclockwise, as rows a_x, a_y, b_x, b_y. Written
+/// without branches, which would be mispredicted, for registers.
 #[inline(always)]
-fn ratio_bounds(wedge: [DVec2; 2], sx: f64, sy: f64) -> (DVec2, DVec2) {
-    let flip = DVec2::new(sx, sy);
-    let [mut a, mut b] = wedge.map(|ray| ray * flip);
-    if sx * sy < 0.0 {
-        std::mem::swap(&mut a, &mut b);
+fn ratio_bounds(rays: &[[f64; 12]; 4]) -> [[f64; 12]; 4] {
+    let mut bounds = [[0.0; 12]; 4];
+    for i in 0..12 {
+        let [ax, ay, bx, by] = [rays[0][i], rays[1][i], rays[2][i], rays[3][i]];
+        // The wedge is narrower than π: a direction d is within it where a × d > 0 and d × b > 0.
+        let from_a = (ax > 0.0) & (ay >= 0.0);
+        let from_x = (ay < 0.0) & (by > 0.0);
+        let (low_x, low_y) = (if from_a { ax } else { 1.0 }, if from_a { ay } else { 0.0 });
+        let to_b = (by > 0.0) & (bx >= 0.0);
+        let to_y = (ax > 0.0) & (bx < 0.0);
+        let (high_x, high_y) = (if to_b { bx } else { 0.0 }, if to_b { by } else { 1.0 });
+        let meet = (from_a | from_x) & (to_b | to_y) & (low_x * high_y > low_y * high_x);
+        bounds[0][i] = if meet { low_x } else { 0.0 };
+        bounds[1][i] = if meet { low_y } else { 1.0 };
+        bounds[2][i] = high_x;
+        bounds[3][i] = high_y;
     }
-    let choose = |one: bool, first: DVec2, second: DVec2| {
-        let x = if one { first.x } else { second.x };
-        let y = if one { first.y } else { second.y };
-        DVec2::new(x, y)
-    };
-    // The wedge is narrower than π, so a direction d is within it where a × d > 0 and d × b > 0.
-    let from_a = (a.x > 0.0) & (a.y >= 0.0);
-    let from_x = (a.y < 0.0) & (b.y > 0.0);
-    let lower = choose(from_a, a, DVec2::X);
-    let to_b = (b.y > 0.0) & (b.x >= 0.0);
-    let to_y = (a.x > 0.0) & (b.x < 0.0);
-    let upper = choose(to_b, b, DVec2::Y);
-    let meet = (from_a | from_x) & (to_b | to_y) & (lower.perp_dot(upper) > 0.0);
-    (choose(meet, lower, DVec2::Y), upper)
+    bounds
 }
