@@ -70,7 +70,12 @@ pub(crate) fn nonnegative<const N: usize>(columns: &[[f64; N]], target: [f64; N]
             let mut leaving = None;
             for (position, &k) in passive.iter().enumerate() {
                 if trial[position] <= 0.0 {
-                    let limit = weights[k] / (weights[k] - trial[position]);
+                    // A weight that enters may be 0 and stay 0.
+                    let limit = if weights[k] > 0.0 {
+                        weights[k] / (weights[k] - trial[position])
+                    } else {
+                        0.0
+                    };
                     if leaving.is_none() || limit < share {
                         share = limit;
                         leaving = Some(position);

@@ -4,6 +4,7 @@ use glam::DVec3;
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// Coordinates of every size, with many exact coincidences.
 fn coordinate() -> impl Strategy<Value = f64> {
@@ -40,7 +41,7 @@ fn grasp<P: Strategy<Value = DVec3>>(
 }
 
 /// The largest ⟨v, w⟩ over all wrenches.
-fn support(cone: &FrictionCone, contacts: &[Contact; 3], center: DVec3, v: [DVec3; 2]) -> f64 {
+fn support(cone: &FrictionCone, contacts: &[Contact], center: DVec3, v: [DVec3; 2]) -> f64 {
     let mut largest = f64::NEG_INFINITY;
     for contact in contacts {
         let frame = Frame::new(contact.normal);
@@ -58,24 +59,58 @@ fn cones() -> impl Strategy<Value = FrictionCone> {
     (friction, 3..18usize).prop_map(|(mu, l)| FrictionCone::new(mu, l).unwrap())
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 4000,
+/// Grasps of one to six contacts.
+fn hand<P: Strategy<Value = DVec3> + 'static>(
+    point: impl Fn() -> P,
+) -> impl Strategy<Value = (Vec<Contact>, DVec3)> {
+    let contact = (point(), normal()).prop_map(|(point, normal)| Contact { point, normal });
+    (prop::collection::vec(contact, 1..7), point())
+}
+
+fn cases(cases: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases,
         failure_persistence: None,
+        // The same cases everywhere; to look for others, change the seed.
+        rng_seed: RngSeed::Fixed(2013),
         ..ProptestConfig::default()
-    })]
+    }
+}
+
+/// The largest distance between corresponding wrenches.
+fn displacement(cone: &FrictionCone, a: &[Contact], b: &[Contact], center: DVec3) -> f64 {
+    let mut largest = 0.0_f64;
+    for (one, other) in a.iter().zip(b) {
+        let (before, after) = (Frame::new(one.normal), Frame::new(other.normal));
+        for j in 0..cone.len() {
+            let (f, g) = (cone.edge(&before, j), cone.edge(&after, j));
+            let torque = (one.point - center).cross(f) - (other.point - center).cross(g);
+            largest = largest.max((f.distance_squared(g) + torque.length_squared()).sqrt());
+        }
+    }
+    largest
+}
+
+proptest! {
+    #![proptest_config(cases(4000))]
 
     #[test]
     fn any_finite_grasp_has_a_finite_quality(
-        (contacts, center) in grasp(vector), cone in cones()
+        (contacts, center) in hand(vector), cone in cones(), torsion in 0.0..0.3_f64
     ) {
-        let mut evaluator = Evaluator::new(&cone);
-        let quality = evaluator.quality(&contacts, center);
-        prop_assert!(quality.is_finite() && quality >= 0.0, "{quality}");
-        let gradient = evaluator.gradient(&contacts, center);
-        prop_assert!(gradient.value.is_finite());
-        let vectors = gradient.contacts.iter().chain(&gradient.normals);
-        prop_assert!(vectors.chain([&gradient.center_of_mass]).all(|v| v.is_finite()));
+        for cone in [cone.clone(), cone.soft(torsion).unwrap()] {
+            let mut evaluator = Evaluator::new(&cone);
+            let quality = evaluator.quality(&contacts, center);
+            prop_assert!(quality.is_finite() && quality >= 0.0, "{quality}");
+            let gradient = evaluator.gradient(&contacts, center);
+            prop_assert!(gradient.value.is_finite());
+            let vectors = gradient.contacts.iter().chain(&gradient.normals);
+            prop_assert!(vectors.chain([&gradient.center_of_mass]).all(|v| v.is_finite()));
+            let each = evaluator.quality_of_each(&contacts, center);
+            prop_assert!(each.is_finite() && each >= 0.0, "{each}");
+            let weakest = evaluator.weakest(&contacts, center, Norm::Sum).direction;
+            prop_assert!(weakest.iter().all(|x| x.is_finite()), "{weakest:?}");
+        }
     }
 
     #[test]
@@ -90,41 +125,154 @@ proptest! {
 
     #[test]
     fn no_direction_is_resisted_less(
-        (contacts, center) in grasp(tame), cone in cones(),
+        (contacts, center) in hand(tame), cone in cones(),
         linear in tame(), angular in tame(),
     ) {
-        let quality = Evaluator::new(&cone).quality(&contacts, center);
+        let mut evaluator = Evaluator::new(&cone);
+        let quality = evaluator.quality(&contacts, center);
         let length = (linear.length_squared() + angular.length_squared()).sqrt();
         let v = [linear / length, angular / length];
+        let weakest = evaluator.weakest(&contacts, center, Norm::Sum).direction;
+        let worst = [0, 3].map(|i| DVec3::new(weakest[i], weakest[i + 1], weakest[i + 2]));
         if quality > 0.0 {
             prop_assert!(support(&cone, &contacts, center, v) >= quality * (1.0 - 1e-9));
+            let least = support(&cone, &contacts, center, worst);
+            prop_assert!((least - quality).abs() <= 1e-9, "{least} {quality}");
+        } else {
+            prop_assert!(support(&cone, &contacts, center, worst) <= 1e-8);
         }
     }
 
     #[test]
     fn the_order_of_contacts_does_not_matter(
-        (contacts, center) in grasp(tame), cone in cones()
+        (contacts, center) in hand(tame), cone in cones()
     ) {
         let mut evaluator = Evaluator::new(&cone);
-        let [a, b, c] = contacts;
         let quality = evaluator.quality(&contacts, center);
-        for order in [[b, a, c], [c, b, a], [b, c, a]] {
-            let other = evaluator.quality(&order, center);
-            prop_assert!((quality - other).abs() <= 1e-11 * (1.0 + quality), "{quality} {other}");
+        let mut other = contacts.clone();
+        for _ in 0..3 {
+            other.rotate_left(1);
+            let last = other.len() - 1;
+            other.swap(0, last);
+            let turned = evaluator.quality(&other, center);
+            let flat = if contacts.len() == 3 { 0.0 } else { 5e-9 };
+            prop_assert!((quality - turned).abs() <= 1e-11 * (1.0 + quality) + flat, "{quality} {turned}");
         }
     }
 
     #[test]
-    fn a_mirror_image_through_a_plane_of_the_cones_is_as_good(
-        (contacts, center) in grasp(tame), cone in cones()
+    fn motions_that_map_the_cones_to_themselves_change_nothing(
+        (contacts, center) in hand(tame), cone in cones(), shift in tame(), turns in 0..18usize
     ) {
-        // y → −y maps the edges 2πj/l to 2π(l − j)/l.
-        let flip = DVec3::new(1.0, -1.0, 1.0);
-        let mirrored = contacts.map(|c| Contact { point: c.point * flip, normal: c.normal * flip });
+        // At −e₃ the frame is not continuous.
+        let upright = |c: &Contact| Contact {
+            normal: if c.normal.z > -0.999 { c.normal } else { -c.normal },
+            ..*c
+        };
+        let contacts: Vec<Contact> = contacts.iter().map(upright).collect();
+        // Turns about e₃ by multiples of 2π/l, a mirror image y → −y, and any translation.
+        let angle = std::f64::consts::TAU * turns as f64 / cone.len() as f64;
+        let flip = DVec3::new(1.0, if turns % 2 == 0 { -1.0 } else { 1.0 }, 1.0);
+        let (sin, cos) = angle.sin_cos();
+        let move_vector = |v: DVec3| {
+            let v = v * flip;
+            DVec3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+        };
+        let moved: Vec<Contact> = contacts
+            .iter()
+            .map(|c| Contact {
+                point: move_vector(c.point) + shift,
+                normal: move_vector(c.normal),
+            })
+            .collect();
+        let mut evaluator = Evaluator::new(&cone);
+        let one = evaluator.quality(&contacts, center);
+        let other = evaluator.quality(&moved, move_vector(center) + shift);
+        // A hull that surrounds the origin by less than 1e-9 of the lever arms counts as flat.
+        let flat = if contacts.len() == 3 { 0.0 } else { 5e-9 };
+        prop_assert!((one - other).abs() <= 1e-10 * (1.0 + one) + flat, "{one} {other}");
+    }
+
+    #[test]
+    fn another_contact_never_hurts(
+        (contacts, center) in hand(tame), cone in cones()
+    ) {
+        let mut evaluator = Evaluator::new(&cone);
+        let more = evaluator.quality(&contacts, center);
+        let fewer = evaluator.quality(&contacts[1..], center);
+        prop_assert!(fewer <= more + 5e-9, "{fewer} {more}");
+    }
+
+    #[test]
+    fn quality_changes_by_no_more_than_the_wrenches_move(
+        (contacts, center) in hand(tame), cone in cones(), size in 1e-6..0.3_f64,
+        moves in prop::collection::vec((tame(), tame()), 6),
+    ) {
+        let moved: Vec<Contact> = contacts
+            .iter()
+            .zip(moves)
+            .map(|(c, (dc, dn))| Contact {
+                point: c.point + dc * size,
+                normal: (c.normal + dn * size).normalize(),
+            })
+            .collect();
         let mut evaluator = Evaluator::new(&cone);
         let (one, other) =
-            (evaluator.quality(&contacts, center), evaluator.quality(&mirrored, center * flip));
-        prop_assert!((one - other).abs() <= 1e-11 * (1.0 + one), "{one} {other}");
+            (evaluator.quality(&contacts, center), evaluator.quality(&moved, center));
+        let bound = displacement(&cone, &contacts, &moved, center);
+        prop_assert!((one - other).abs() <= bound + 5e-9, "{one} {other} {bound}");
+    }
+
+    #[test]
+    fn more_friction_never_hurts_and_helps_in_proportion(
+        (contacts, center) in hand(tame), l in 3..18usize, mu in 0.05..2.0_f64, share in 0.1..1.0_f64
+    ) {
+        let quality = |mu: f64| {
+            let cone = FrictionCone::new(mu, l).unwrap();
+            Evaluator::new(&cone).quality(&contacts, center)
+        };
+        let (low, high) = (quality(share * mu), quality(mu));
+        prop_assert!(low <= high + 5e-9, "{low} {high}");
+        // Only tangential forces change, by (1 − share) μ, and the torques that they make.
+        let lever = contacts.iter().map(|c| c.point.distance(center)).fold(0.0, f64::max);
+        let bound = (1.0 - share) * mu * (1.0 + lever * lever).sqrt();
+        prop_assert!(high - low <= bound + 5e-9, "{low} {high} {bound}");
+    }
+
+    #[test]
+    fn threshold_questions_agree_with_the_value(
+        (contacts, center) in hand(tame), cone in cones(), share in 0.5..1.5_f64
+    ) {
+        let mut evaluator = Evaluator::new(&cone);
+        let quality = evaluator.quality(&contacts, center);
+        for threshold in [quality, quality * share, share - 0.5] {
+            let answer = evaluator.is_at_least(&contacts, center, threshold);
+            prop_assert_eq!(answer, quality >= threshold, "{} {}", quality, threshold);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(400))]
+
+    #[test]
+    fn measures_are_in_their_order(
+        (contacts, center) in hand(tame), mu in 0.1..1.5_f64, l in 4..17usize, torsion in 0.01..0.3_f64
+    ) {
+        let cone = FrictionCone::new(mu, l).unwrap();
+        let around = FrictionCone::new(mu / (std::f64::consts::PI / l as f64).cos(), l).unwrap();
+        let mut evaluator = Evaluator::new(&cone);
+        let quality = evaluator.quality(&contacts, center);
+        let (lower, upper) = evaluator.circular(&contacts, center, 1e-2);
+        prop_assert!(lower <= upper && upper <= lower / (1.0 - 1e-2) + 1e-9, "{lower} {upper}");
+        prop_assert!(quality <= upper + 1e-9, "{quality} {upper}");
+        let outside = Evaluator::new(&around).quality(&contacts, center);
+        prop_assert!(lower <= outside + 1e-9, "{lower} {outside}");
+        let each = evaluator.quality_of_each(&contacts, center);
+        prop_assert!(quality <= each + 1e-9, "{quality} {each}");
+        prop_assert!(each <= quality * contacts.len() as f64 + 1e-9, "{quality} {each}");
+        let soft = Evaluator::new(&cone.soft(torsion).unwrap()).quality(&contacts, center);
+        prop_assert!(quality <= soft + 1e-9, "{quality} {soft}");
     }
 }
 

@@ -260,13 +260,12 @@ impl Evaluator {
             .kernel
             .within(contacts, center_of_mass, distance, most)?;
         let mut row = [0.0; 22];
-        let gradients: Vec<Gradient> = vertices
-            .iter()
-            .filter_map(|vertex| {
-                gradient::of_vertex(vertex, contacts, center_of_mass, cone, false, &mut row)
-                    .then(|| Gradient::from_row(&row))
-            })
-            .collect();
+        let mut gradients = Vec::new();
+        for vertex in vertices {
+            if gradient::of_vertex(vertex, contacts, center_of_mass, cone, false, &mut row) {
+                gradients.push(Gradient::from_row(&row));
+            }
+        }
         (!gradients.is_empty()).then_some(gradients)
     }
 }

@@ -25,8 +25,9 @@ pub(super) trait Support {
 }
 
 /// Circumradii of the simplex about the origin that is the first inner polytope, tried one after
-/// the other: a large one is accurate, a small one fits into small hulls.
-const SEEDS: [f64; 3] = [1e-2, 1e-5, 1e-9];
+/// the other, and the perturbations that go with them: from a large one facets are accurate, a
+/// small one fits into small hulls.
+const SEEDS: [(f64, f64); 3] = [(1e-2, 1e-11), (1e-5, 1e-9), (1e-9, 1e-5)];
 /// Slots of the table of ridges: free, and met twice.
 const EMPTY: u32 = u32::MAX;
 const JOINED: u32 = u32::MAX - 1;
@@ -136,10 +137,10 @@ impl Polytope {
             return Distance::zero(x);
         }
         let mut outside = [0.0; 6];
-        for seed in SEEDS {
+        for (seed, perturbation) in SEEDS {
             // A failure by rounding is cured by other, larger perturbations.
-            for attempt in 0..3 {
-                let epsilon = 1e-12 / seed * 10f64.powi(attempt);
+            for attempt in 0..4 {
+                let epsilon = perturbation * 10f64.powi(attempt);
                 match self.expand(support, scale, seed, epsilon, &mut enough) {
                     Ok(distance) => return distance,
                     Err(Failure::TooSmall(x)) => {
@@ -397,9 +398,12 @@ fn separating(support: &impl Support) -> Option<Twist> {
         let back = p.map(|c| -c / length);
         let (s, _) = support.farthest(&back);
         let height = dot(&back, &s);
-        // Negated: a hull through the origin gives 0/0.
-        if !(height >= -DEGENERATE) {
-            return (height < 0.0).then_some(back);
+        // A hull through the origin gives 0/0.
+        if height.is_nan() {
+            return None;
+        }
+        if height < -DEGENERATE {
+            return Some(back);
         }
         let way: Twist = std::array::from_fn(|i| s[i] - p[i]);
         let share = -dot(&p, &way) / dot(&way, &way);
