@@ -7,10 +7,10 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format bench clean prerequisites
+.PHONY: help demo test test-extras lint format bench clean prerequisites
 
 help: ## This list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
 demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
 	@mkdir -p out
@@ -19,7 +19,12 @@ demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
 
 test: $(READY) ## Every test, Rust and Python
 	cargo test --release --quiet --package graspmoduli
-	$(BIN)/pytest --numprocesses auto python tests
+	$(BIN)/pytest --numprocesses auto --ignore tests/extras \
+	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py python tests
+
+test-extras: $(READY) ## The tests of torch and jax: installs both, several gigabytes
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[torch,jax]'
+	$(BIN)/pytest tests/extras
 
 lint: $(READY) ## Formatting, clippy, ruff and types
 	cargo fmt --check

@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-def uniform_grasps(n, rng):
+def uniform_grasps(n, rng, m=3):
     """Uniform in D(1): contacts and centre of mass in the unit ball, normals on the sphere."""
 
     def sphere(count):
@@ -18,7 +18,7 @@ def uniform_grasps(n, rng):
     def ball(count):
         return sphere(count) * rng.random((count, 1)) ** (1 / 3)
 
-    return ball(3 * n).reshape(n, 3, 3), sphere(3 * n).reshape(n, 3, 3), ball(n)
+    return ball(m * n).reshape(n, m, 3), sphere(m * n).reshape(n, m, 3), ball(n)
 
 
 @pytest.fixture(scope="session")
