@@ -38,6 +38,15 @@ def quality(contacts, normals, center_of_mass, friction=1.0, edges=8, options="Q
         return 0.0
 
 
+def scaled_quality(contacts, normals, center_of_mass, friction, size, edges=8):
+    """The same with torques divided by ``size`` first: the hull is an affine image, and its facets
+    are mapped back one by one."""
+    points = wrenches(contacts, normals, center_of_mass, friction, edges)
+    scale = np.array([1, 1, 1, size, size, size])
+    planes = ConvexHull(points / scale, qhull_options="Qt").equations
+    return float((-planes[:, -1] / np.linalg.norm(planes[:, :-1] / scale, axis=1)).min())
+
+
 def force_closure_margin(contacts, normals, center_of_mass, friction=1.0, edges=8):
     """The largest t ≤ 1 with 0 = Σ α w, Σ α = 1, all α ≥ t/(m·l): positive exactly if 0 is in the
     relative interior. With a wrench matrix of rank 6 that is force closure."""

@@ -1,16 +1,17 @@
-"""Q_l of three contacts: published numbers, the twin, invariants, degenerate and wrong input."""
+"""Q_l and its relatives: published numbers, twins, invariants, degenerate and wrong input."""
 
 import itertools
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
 
 import graspmoduli as gm
 import reference
 from conftest import uniform_grasps
+from degenerate import CASES, CIRCLE
 
-ANGLE = 2 * np.pi * np.arange(3) / 3
-CIRCLE = np.stack([np.cos(ANGLE), np.sin(ANGLE), 0 * ANGLE], axis=1)
 PINCH = np.array([[1.0, 0, 0], [-1, 0, 0.5], [-1, 0, -0.5]])
 PINCH_NORMALS = np.array([[-1.0, 0, 0], [1, 0, 0], [1, 0, 0]])
 ORIGIN = np.zeros(3)
@@ -68,6 +69,127 @@ def test_values_agree_with_qhull(uniform, friction, edges):
         contacts, normals, center = (array[i] for array in uniform)
         wanted = reference.quality(contacts, normals, center, friction, edges)
         assert q[i] == pytest.approx(max(wanted, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("m", [4, 5, 8])
+@pytest.mark.parametrize("edges", [3, 8, 13])
+def test_values_of_more_contacts_agree_with_qhull(m, edges):
+    grasps = uniform_grasps(60, np.random.default_rng(m), m)
+    q = gm.quality(*grasps, friction=0.7, edges=edges)
+    assert (q > 0).sum() > 5
+    for value, contacts, normals, center in zip(q, *grasps, strict=True):
+        wanted = reference.quality(contacts, normals, center, 0.7, edges)
+        assert value == pytest.approx(max(wanted, 0.0), abs=1e-9)
+
+
+class TestRelatives:
+    """Other norms and cones, against hulls of all their points."""
+
+    def test_each_finger_at_most_1_is_the_minkowski_sum(self):
+        contacts, normals, centers = uniform_grasps(40, np.random.default_rng(21))
+        q = gm.quality(contacts, normals, centers, edges=3, norm="each")
+        for i in range(len(q)):
+            wrenches = reference.wrenches(contacts[i], normals[i], centers[i], edges=3)
+            own = [np.vstack([np.zeros(6), w]) for w in wrenches.reshape(3, 3, 6)]
+            points = [sum(choice) for choice in itertools.product(*own)]
+            wanted = -ConvexHull(points, qhull_options="QJ Q12").equations[:, -1].max()
+            # QJ moves the points by some 1e-10.
+            assert q[i] == pytest.approx(max(wanted, 0.0), abs=1e-7)
+        assert (q > 0).any()
+
+    def test_a_force_limit_per_finger_helps_at_most_m_times(self, uniform):
+        grasps = [array[:300] for array in uniform]
+        total, each = gm.quality(*grasps), gm.quality(*grasps, norm="each")
+        assert (each >= total - 1e-12).all()
+        assert (each <= 3 * total + 1e-9).all()
+
+    def test_soft_fingers_join_two_wrenches_each(self):
+        contacts, normals, centers = uniform_grasps(60, np.random.default_rng(22))
+        q = gm.quality(contacts, normals, centers, torsion=0.2)
+        for i in range(len(q)):
+            wrenches = [reference.wrenches(contacts[i], normals[i], centers[i])]
+            for c, n in zip(contacts[i], normals[i], strict=True):
+                torque = np.cross(c - centers[i], n)
+                wrenches += [[[*n, *(torque + 0.2 * n)]], [[*n, *(torque - 0.2 * n)]]]
+            hull = ConvexHull(np.concatenate(wrenches), qhull_options="Qt")
+            assert q[i] == pytest.approx(max(-hull.equations[:, -1].max(), 0.0), abs=1e-9)
+
+    def test_two_soft_fingers_can_hold_an_object(self):
+        pair = [[1, 0, 0], [-1, 0, 0]], [[-1, 0, 0], [1, 0, 0]], ORIGIN
+        assert gm.quality(*pair) == 0.0
+        soft = gm.quality(*pair, torsion=0.1)
+        assert 0.0 < soft <= 0.1
+        assert gm.quality(*pair, torsion=0.2) > soft
+
+    def test_circular_cones_lie_between_fine_polygonal_ones(self):
+        for m in (3, 4):
+            grasps = uniform_grasps(40, np.random.default_rng(23), m)
+            bounds = gm.circular_quality(*grasps, friction=0.8, tolerance=1e-3)
+            inside = gm.quality(*grasps, friction=0.8, edges=64)
+            outside = gm.quality(*grasps, friction=0.8 / np.cos(np.pi / 64), edges=64)
+            assert (bounds.lower <= bounds.upper).all()
+            assert (inside <= bounds.upper + 1e-12).all()
+            assert (bounds.lower <= outside + 1e-12).all()
+            assert (bounds.upper - bounds.lower <= 1e-3 * bounds.upper).all()
+            assert not np.isnan(bounds.value).any()
+
+    def test_circular_cones_do_not_depend_on_the_axes(self):
+        contacts, normals, centers = uniform_grasps(40, np.random.default_rng(24))
+        turn = np.linalg.qr(np.random.default_rng(25).normal(size=(3, 3)))[0]
+        turn *= np.linalg.det(turn)
+        one = gm.circular_quality(contacts, normals, centers, tolerance=1e-4)
+        other = gm.circular_quality(contacts @ turn, normals @ turn, centers @ turn, tolerance=1e-4)
+        assert (one.lower <= other.upper + 1e-12).all()
+        assert (other.lower <= one.upper + 1e-12).all()
+
+    def test_bounds_of_a_single_grasp_are_floats(self):
+        bounds = gm.circular_quality(CIRCLE, -CIRCLE, ORIGIN)
+        assert type(bounds.lower) is float
+        assert bounds.lower <= bounds.value <= bounds.upper
+        with pytest.raises(gm.GraspModuliError, match="tolerance must lie in"):
+            gm.circular_quality(CIRCLE, -CIRCLE, ORIGIN, tolerance=0.0)
+
+    def test_seven_contacts_can_do_without_friction(self):
+        # Fingers on the faces of a cube, off their centres so that they turn it both ways.
+        contacts = [
+            [1, 0.5, 0.3], [-1, -0.4, 0.2], [0.2, 1, 0.5], [0.3, -1, -0.4], [0.5, 0.1, 1],
+            [-0.4, -0.3, -1], [1, -0.5, -0.6], [-0.5, 0.4, 1], [-1, 0.5, -0.3],
+        ]  # fmt: skip
+        normals = [[-np.sign(c[k]) if abs(c[k]) == 1 else 0 for k in range(3)] for c in contacts]
+        q = gm.quality(contacts, normals, ORIGIN, friction=0.0)
+        points = reference.wrenches(contacts, np.array(normals, float), ORIGIN, 0.0)
+        wanted = -ConvexHull(points[::8], qhull_options="Qt").equations[:, -1].max()
+        assert q == pytest.approx(max(wanted, 0.0), abs=1e-9)
+        assert gm.quality(contacts[:6], normals[:6], ORIGIN, friction=0.0) == 0.0
+
+
+class TestThresholds:
+    @pytest.mark.parametrize("m", [3, 4])
+    def test_answers_are_those_of_comparing(self, m):
+        grasps = uniform_grasps(2000, np.random.default_rng(31), m)
+        q = gm.quality(*grasps)
+        for threshold in (-1.0, 0.0, 1e-3, 0.05, 0.2, float(np.median(q[q > 0]))):
+            answers = gm.quality_at_least(*grasps, threshold)
+            np.testing.assert_array_equal(answers, q >= threshold)
+        assert gm.quality_at_least(*(a[0] for a in grasps), 0.0) is True
+
+    @pytest.mark.parametrize("m", [3, 4])
+    def test_the_best_and_the_worst(self, m):
+        grasps = uniform_grasps(3000, np.random.default_rng(32), m)
+        q = gm.quality(*grasps)
+        stable = [a[q > 0].reshape(-1, 1, *a.shape[1:]) for a in grasps]
+        q = q[q > 0]
+        best, worst = gm.largest_quality(*stable), gm.smallest_quality(*stable)
+        assert best == gm.Extreme((int(q.argmax()), 0), q.max())
+        assert worst == gm.Extreme((int(q.argmin()), 0), q.min())
+
+    def test_among_equals_it_is_the_first(self):
+        contacts = np.stack([0.5 * CIRCLE, CIRCLE, CIRCLE, 0.5 * CIRCLE])
+        normals = np.stack([-CIRCLE] * 4)
+        assert gm.largest_quality(contacts, normals, ORIGIN).index == (1,)
+        assert gm.smallest_quality(contacts, normals, ORIGIN).index == (0,)
+        with pytest.raises(gm.GraspModuliError, match="at least one grasp"):
+            gm.largest_quality(contacts[:0], normals[:0], ORIGIN)
 
 
 class TestInvariance:
@@ -157,6 +279,64 @@ class TestGradient:
             assert kink.mean() < 0.02
         assert wrong == 0
 
+    @pytest.mark.parametrize("options", [{}, {"torsion": 0.1}, {"edges": 5, "friction": 0.6}])
+    @pytest.mark.parametrize("m", [2, 3, 4, 6])
+    def test_is_that_of_finite_differences_for_any_hand(self, m, options):
+        rng = np.random.default_rng(m)
+        grasps = uniform_grasps(1000, rng, m)
+        q = gm.quality(*grasps, **options)
+        contacts, normals, centers = (array[q > 0.02][:20] for array in grasps)
+        if m == 2 and "torsion" not in options:
+            assert len(contacts) == 0
+            return
+        gradient = gm.quality_gradient(contacts, normals, centers, **options)
+        np.testing.assert_array_equal(
+            gradient.value, gm.quality(contacts, normals, centers, **options)
+        )
+        h, wrong, kinks = 1e-6, 0, 0
+        for _ in range(3):
+            dc, dn, dz = (rng.normal(size=a.shape) for a in (contacts, normals, centers))
+
+            def at(step, dc=dc, dn=dn, dz=dz):
+                turned = normals + step * dn
+                turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+                return gm.quality(contacts + step * dc, turned, centers + step * dz, **options)
+
+            difference = (at(h) - at(-h)) / (2 * h)
+            predicted = (
+                (gradient.contacts * dc).sum((1, 2))
+                + (gradient.normals * dn).sum((1, 2))
+                + (gradient.center_of_mass * dz).sum(1)
+            )
+            kink = np.abs(at(h) + at(-h) - 2 * gradient.value) > 1e-9
+            wrong += (np.abs(difference - predicted) > 1e-5 * (1 + np.abs(predicted)))[~kink].sum()
+            kinks += kink.sum()
+        assert wrong == 0
+        assert kinks <= 0.1 * 3 * len(contacts)
+
+    @pytest.mark.parametrize("m", [3, 4])
+    def test_at_a_kink_is_a_mean_of_gradients_nearby(self, m):
+        # Regular polygons of fingers have many nearest facets. An element of Clarke's generalised
+        # gradient is a convex combination of gradients at points nearby.
+        angle = 2 * np.pi * np.arange(m) / m
+        circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        gradient = gm.quality_gradient(circle, -circle, ORIGIN)
+
+        def flat(g):
+            return np.concatenate([g.contacts, g.normals], axis=-2).reshape(-1, 6 * m)
+
+        rng = np.random.default_rng(41)
+        n, h = 4000, 1e-7
+        moved = circle + h * rng.normal(size=(n, m, 3))
+        turned = -circle + h * rng.normal(size=(n, m, 3))
+        turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+        nearby = flat(gm.quality_gradient(moved, turned, h * rng.normal(size=(n, 3))))
+        assert np.ptp(nearby, axis=0).max() > 0.1
+        columns = np.vstack([nearby.T, 10.0 * np.ones(n)])
+        target = np.concatenate([flat(gradient)[0], [10.0]])
+        _, residual = nnls(columns, target, maxiter=20_000)
+        assert residual < 1e-4
+
     def test_normals_have_tangent_gradients_and_translations_none(self, uniform):
         contacts, normals, centers = (array[:2000] for array in uniform)
         gradient = gm.quality_gradient(contacts, normals, centers)
@@ -183,40 +363,20 @@ class TestGradient:
 
 
 class TestDegenerate:
-    def test_small_and_large_circles(self):
-        for radius in (1e-6, 1e-4, 1e4):
-            q = gm.quality(radius * CIRCLE, -CIRCLE, ORIGIN)
-            points = reference.wrenches(radius * CIRCLE, -CIRCLE, ORIGIN)
-            # Qhull works on wrenches with torques of the order of forces; the hull is an
-            # affine image, so compare facet by facet after scaling back.
-            from scipy.spatial import ConvexHull
-
-            scale = np.array([1, 1, 1, radius, radius, radius])
-            planes = ConvexHull(points / scale, qhull_options="Qt").equations
-            wanted = (-planes[:, -1] / np.linalg.norm(planes[:, :-1] / scale, axis=1)).min()
-            assert q == pytest.approx(wanted, rel=1e-9)
-
-    @pytest.mark.parametrize(
-        ("contacts", "normals"),
-        [
-            pytest.param([[1, 0, 0], [-1, 0, 0]], [[-1, 0, 0], [1, 0, 0]], id="two contacts"),
-            pytest.param([[1, 0, 0]], [[-1, 0, 0]], id="one contact"),
-            pytest.param(
-                [[1, 0, 0], [-1, 0, 0], [0, 0, 0]],
-                [[-1, 0, 0], [1, 0, 0], [0, 0, 1]],
-                id="collinear",
-            ),
-            pytest.param(
-                [[1, 0, 0], [-1, 0, 0], [-1, 0, 0]],
-                [[-1, 0, 0], [1, 0, 0], [1, 0, 0]],
-                id="antipodal with a duplicate",
-            ),
-            pytest.param([[1, 1, 1]] * 3, [[-1, 0, 0], [1, 0, 0], [0, 0, 1]], id="coincident"),
-            pytest.param(CIRCLE, [[0, 0, 1]] * 3, id="pushing one way"),
-        ],
-    )
-    def test_quality_is_exactly_0(self, contacts, normals):
-        assert gm.quality(contacts, normals, ORIGIN) == 0.0
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+    def test_quality_is_the_true_one(self, case):
+        q = gm.quality(case.contacts, case.normals, case.center, friction=case.friction)
+        true = case.truth()
+        if true == 0.0:
+            assert q == 0.0
+        else:
+            assert q == pytest.approx(true, rel=1e-9, abs=1e-16)
+        gradient = gm.quality_gradient(
+            case.contacts, case.normals, case.center, friction=case.friction
+        )
+        assert gradient.value == q
+        assert np.isfinite(gradient.contacts).all()
+        assert np.isfinite(gradient.normals).all()
 
     def test_collinear_to_rounding_after_any_rotation(self):
         rng = np.random.default_rng(6)
@@ -237,17 +397,6 @@ class TestDegenerate:
             assert q == pytest.approx(
                 max(reference.quality(contacts, normals, ORIGIN), 0), abs=1e-10
             )
-
-    def test_a_normal_at_minus_e3(self):
-        contacts = np.array([[0, 0, 1.0], [0.5, 0, -1], [-0.5, 0.1, -1]])
-        normals = np.array([[0, 0, -1.0], [0, 0, 1], [0, 0, 1]])
-        q = gm.quality(contacts, normals, ORIGIN)
-        assert q > 0.1
-        assert q == pytest.approx(reference.quality(contacts, normals, ORIGIN), abs=1e-11)
-
-    def test_a_contact_at_the_centre_of_mass(self):
-        q = gm.quality(CIRCLE, -CIRCLE, CIRCLE[0])
-        assert q == pytest.approx(reference.quality(CIRCLE, -CIRCLE, CIRCLE[0]), abs=1e-11)
 
     def test_symmetric_grasps_whose_facets_coincide(self):
         # Grasps in a plane through an axis of revolution have many facets at the same distance.
@@ -296,13 +445,13 @@ class TestWrongInput:
             ),
             ((CIRCLE * np.nan, -CIRCLE, ORIGIN), {}, "contacts must be finite, got nan at index"),
             ((CIRCLE, -CIRCLE, [0, np.inf, 0]), {}, "center_of_mass must be finite, got inf"),
-            ((CIRCLE, -CIRCLE, ORIGIN), {"friction": 0.0}, "friction must be a positive"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"torsion": -0.1}, "torsion must be .* got -0.1"),
+            ((CIRCLE, -CIRCLE, ORIGIN), {"norm": "L2"}, 'norm must be "sum" or "each", got \'L2\''),
             ((CIRCLE, -CIRCLE, ORIGIN), {"friction": -1}, "friction must be .* got -1"),
             ((CIRCLE, -CIRCLE, ORIGIN), {"friction": "rough"}, "friction must be .* got 'rough'"),
             ((CIRCLE, -CIRCLE, ORIGIN), {"edges": 2}, "edges must be at least 3, got 2"),
             ((CIRCLE, -CIRCLE, ORIGIN), {"edges": 8.5}, "edges must be a whole number"),
             (("here", -CIRCLE, ORIGIN), {}, "contacts must be an array of numbers, got 'here'"),
-            ((np.ones((4, 3)), np.ones((4, 3)) / 3**0.5, ORIGIN), {}, "contacts must be at most 3"),
             ((CIRCLE[:0], CIRCLE[:0], ORIGIN), {}, "contacts must be at least one"),
             (
                 (np.stack([CIRCLE] * 2), -CIRCLE, np.zeros((3, 3))),

@@ -232,3 +232,35 @@ class TestModels:
     def test_an_unknown_name_lists_the_known_ones(self):
         with pytest.raises(KeyError, match="a, b, c"):
             _ = gm.shapes.MODELS["z"]
+
+
+class TestGraspGradient:
+    @pytest.mark.parametrize("m", [3, 4])
+    @pytest.mark.parametrize("name", ["b", "f", "k"])
+    def test_is_that_of_finite_differences(self, name, m):
+        surface = gm.shapes.MODELS[name]
+        rng = np.random.default_rng(61)
+        h, tried = 1e-6, 0
+        while tried < 10:
+            u, theta = rng.uniform(0.1, 0.9, m), rng.uniform(0, 2 * np.pi, m)
+            slope = gm.grasp_gradient(surface, gm.Grasp(u, theta), friction=0.8)
+            if slope.value < 0.01:
+                continue
+            du, dtheta = rng.normal(size=(2, m))
+
+            def at(step, u=u, theta=theta, du=du, dtheta=dtheta):
+                moved = gm.Grasp(u + step * du, theta + step * dtheta)
+                return gm.place(surface, moved).quality(friction=0.8)
+
+            if abs(at(h) + at(-h) - 2 * slope.value) > 1e-9:
+                continue
+            tried += 1
+            predicted = slope.u @ du + slope.theta @ dtheta
+            assert (at(h) - at(-h)) / (2 * h) == pytest.approx(predicted, rel=1e-5, abs=1e-6)
+
+    def test_another_centre_of_mass(self):
+        surface = gm.shapes.MODELS["f"]
+        grasp = gm.Grasp([0.5, 0.5, 0.5], [0.0, 2.0, 4.0])
+        slope = gm.grasp_gradient(surface, grasp, center_of_mass=[0, 0, 0.1])
+        placed = gm.place(surface, grasp)
+        assert slope.value == gm.quality(placed.contacts, placed.normals, [0, 0, 0.1])

@@ -5,7 +5,7 @@ grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circula
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
-grasps                 :class:`Grasp`, :func:`place`
+grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
 errors                 :class:`GraspModuliError`
@@ -23,8 +23,10 @@ from .fitting import ObjectGrasp as ObjectGrasp
 from .fitting import Residual as Residual
 from .fitting import fit as fit
 from .grasps import Grasp as Grasp
+from .grasps import GraspGradient as GraspGradient
 from .grasps import PlacedGrasp as PlacedGrasp
 from .grasps import RankedGrasp as RankedGrasp
+from .grasps import grasp_gradient as grasp_gradient
 from .grasps import place as place
 from .quality import Bounds as Bounds
 from .quality import Extreme as Extreme

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import Floats, floats, locked
 from ._core import GraspModuliError
-from .quality import quality
+from .quality import quality, quality_gradient
 from .surfaces import Surface
 
 
@@ -92,3 +92,53 @@ def place(surface: Surface, grasp: Grasp) -> PlacedGrasp:
         normals=locked(surface.normals(grasp.u, grasp.theta).copy()),
         center_of_mass=surface.center_of_mass,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class GraspGradient:
+    """Q_l of a grasp on a surface, and its derivatives along the surface."""
+
+    #: Q_l.
+    value: float
+    #: ∂Q/∂u_i. Shape (m,).
+    u: Floats
+    #: ∂Q/∂θ_i. Shape (m,).
+    theta: Floats
+
+
+def grasp_gradient(
+    surface: Surface,
+    grasp: Grasp,
+    *,
+    friction: float = 1.0,
+    edges: int = 8,
+    torsion: float = 0.0,
+    center_of_mass: ArrayLike | None = None,
+) -> GraspGradient:
+    """Exact derivatives of Q_l by the contact coordinates of a grasp on a surface.
+
+    With t₁ = ∂c/∂u: dQ/du = ⟨∂Q/∂c, t₁⟩ + ⟨∂Q/∂n, ∂n/∂u⟩, and likewise for θ. The normals turn with
+    the surface. Where Q is not differentiable, what :func:`graspmoduli.quality_gradient` says of
+    its result holds for this one.
+
+    Parameters
+    ----------
+    surface, grasp
+        As in :func:`place`.
+    friction, edges, torsion
+        As in :func:`graspmoduli.quality`.
+    center_of_mass
+        Shape (3,); the surface's own z_S if not given. It stays where it is.
+    """
+    placed = place(surface, grasp)
+    center = placed.center_of_mass if center_of_mass is None else center_of_mass
+    slope = quality_gradient(
+        placed.contacts, placed.normals, center, friction=friction, edges=edges, torsion=torsion
+    )
+    tangents = surface.tangents(grasp.u, grasp.theta)
+    turns = surface.normal_derivatives(grasp.u, grasp.theta)
+    along_u, along_theta = (
+        locked((slope.contacts * tangent + slope.normals * turn).sum(-1))
+        for tangent, turn in zip(tangents, turns, strict=True)
+    )
+    return GraspGradient(slope.value, along_u, along_theta)

@@ -25,9 +25,7 @@ def _value(contacts: Any, normals: Any, center: Any, options: tuple[float, int, 
     friction, edges, torsion = options
 
     def call(*arrays: Any) -> Any:
-        values = gm.quality(
-            *_double(*arrays), friction=friction, edges=edges, torsion=torsion
-        )
+        values = gm.quality(*_double(*arrays), friction=friction, edges=edges, torsion=torsion)
         return np.asarray(values, dtype=contacts.dtype)
 
     shape = jax.ShapeDtypeStruct(contacts.shape[:-2], contacts.dtype)
@@ -55,7 +53,9 @@ def _tangent(options: Any, primals: Any, tangents: Any) -> Any:
 
 def _double(contacts: Any, normals: Any, center: Any) -> tuple[Any, Any, Any]:
     """The same in float64, normals unit again after single precision."""
-    contacts, normals, center = (np.asarray(a, dtype=np.float64) for a in (contacts, normals, center))
+    contacts, normals, center = (
+        np.asarray(a, dtype=np.float64) for a in (contacts, normals, center)
+    )
     return contacts, normals / np.linalg.norm(normals, axis=-1, keepdims=True), center
 
 

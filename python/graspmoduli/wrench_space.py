@@ -145,9 +145,7 @@ class WrenchSpace:
             spins = np.concatenate([spins, [self.torsion, -self.torsion]])
         first, second = _tangents(self.normals)
         forces = (
-            local[:, :1] * first[:, None]
-            + local[:, 1:] * second[:, None]
-            + self.normals[:, None]
+            local[:, :1] * first[:, None] + local[:, 1:] * second[:, None] + self.normals[:, None]
         )
         return forces.reshape(-1, 3), spins
 

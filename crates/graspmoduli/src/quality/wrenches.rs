@@ -117,8 +117,7 @@ impl Support for Circular<'_> {
         let angular = DVec3::new(x[3], x[4], x[5]) / self.scale;
         for contact in self.contacts {
             let velocity = linear + angular.cross(contact.point - self.center);
-            let sliding = velocity - contact.normal * velocity.dot(contact.normal);
-            let force = contact.normal + sliding.normalize_or_zero() * self.friction;
+            let force = contact.normal + sideways(velocity, contact.normal) * self.friction;
             let wrench = wrench(contact, self.center, force, 0.0, self.scale);
             let height = dot(x, &wrench);
             if height > best.1 {
@@ -131,5 +130,18 @@ impl Support for Circular<'_> {
             .iter()
             .fold(0u64, |key, c| key.rotate_left(9) ^ c.to_bits());
         (best.0, key)
+    }
+}
+
+/// The unit vector across `normal` that goes most along `velocity`. At the apex of the polar cone
+/// the velocity is along the normal; then any will do, but it must be across and of length 1.
+fn sideways(velocity: DVec3, normal: DVec3) -> DVec3 {
+    let across = |v: DVec3| (v - normal * v.dot(normal)).normalize_or_zero();
+    // Twice: what is left of a velocity along the normal is rounding, in any direction.
+    let found = across(across(velocity));
+    if found == DVec3::ZERO {
+        normal.any_orthonormal_vector()
+    } else {
+        found
     }
 }
