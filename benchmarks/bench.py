@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 import graspmoduli as gm
 
@@ -24,48 +24,111 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 import reference  # noqa: E402
 from conftest import uniform_grasps  # noqa: E402
+from degenerate import CASES  # noqa: E402
 
 REPEATS = 5
 
 
-def seconds(work, amount):
+def seconds(work, amount, repeats=REPEATS):
     """Median over repeats of the time per unit of work."""
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         start = time.perf_counter()
         work()
         times.append((time.perf_counter() - start) / amount)
     return float(np.median(times))
 
 
-def qhull(grasps, options):
+def qhull(grasps, options, edges=8):
     """SciPy's time per grasp: the hull and the smallest offset, wrenches made beforehand."""
-    points = [reference.wrenches(*grasp) for grasp in zip(*grasps, strict=True)]
+    points = [reference.wrenches(*grasp, edges=edges) for grasp in zip(*grasps, strict=True)]
 
     def work():
         for p in points:
             max(0.0, -ConvexHull(p, qhull_options=options).equations[:, -1].max())
 
-    return seconds(work, len(points))
+    return seconds(work, len(points), repeats=3)
+
+
+def operations(l):
+    """Floating-point operations of the closed form on a force-closure grasp, multiply-add as two;
+    comparisons, minima and signs not counted. See docs/mathematics.md."""
+    apex_ray_face = 6 * l * (75 + 3 * l + 2 * 4)
+    ray_ray_ray = l**3 * (3 * 3 + 12) + l**2 * 60
+    return apex_ray_face + ray_ray_ray
+
+
+def multiplication_rate():
+    """Floating-point operations per second of BLAS on one core, multiplying matrices."""
+    n = 512
+    a = np.random.default_rng(0).random((n, n))
+    a @ a
+    return 2 * n**3 / min(seconds(lambda: a @ a, 1, repeats=1) for _ in range(20))
 
 
 def kernel_rows():
     """In a process of its own, on one core."""
-    os.environ["RAYON_NUM_THREADS"] = "1"
-    mix = uniform_grasps(100_000, np.random.default_rng(0))
-    q = gm.quality(*mix)
-    stable = [array[q > 0] for array in mix]
-    few_mix, few_stable = ([a[:200] for a in g] for g in (mix, stable))
     rows = []
-    for name, many, few in (("uniform D(1)", mix, few_mix), ("stable", stable, few_stable)):
-        ours = seconds(lambda many=many: gm.quality(*many), len(many[0]))
-        for options in ("QJ", "Qt"):
-            theirs = qhull(few, options)
-            rows.append((f"Q_8, {name}, one core", f"SciPy ConvexHull {options}", theirs, ours))
-    value = seconds(lambda: gm.quality(*stable), len(stable[0]))
-    gradient = seconds(lambda: gm.quality_gradient(*stable), len(stable[0]))
-    rows.append(("Q_8, stable, one core", "its exact gradient", gradient, value))
-    return rows
+
+    def compare(name, grasps, few, all_options=("QJ", "Qt"), edges=8):
+        ours = seconds(lambda: gm.quality(*grasps, edges=edges), len(grasps[0]))
+        sample = [array[:few] for array in grasps]
+        for options in all_options:
+            theirs = qhull(sample, options, edges)
+            rows.append((f"Q_{edges}, {name}", ours, f"SciPy ConvexHull {options}", theirs))
+        return ours
+
+    def draw(count, m):
+        grasps = uniform_grasps(count, np.random.default_rng(0), m)
+        q = gm.quality(*grasps)
+        return grasps, [array[q > 0] for array in grasps]
+
+    mix, stable = draw(100_000, 3)
+    compare("3 contacts, uniform D(1)", mix, 300)
+    value = compare("3 contacts, force closure", stable, 200)
+    for edges in (16, 32):
+        part = [array[:2000] for array in stable]
+        compare("3 contacts, force closure", part, 20, ("QJ",), edges)
+    for m in (4, 5, 8):
+        grasps, _ = draw(3000, m)
+        compare(f"{m} contacts, uniform D(1)", grasps, 60)
+    for m, name in ((3, "3"), (4, "4")):
+        _, some = (mix, stable) if m == 3 else draw(3000, m)
+        count = len(some[0])
+        one = seconds(lambda some=some: gm.quality(*some), count)
+        what = f"{name} contacts, force closure"
+        slope = seconds(lambda some=some: gm.quality_gradient(*some), count)
+        rows.append((f"Q_8, {what}", one, "value and exact gradient", slope))
+        for threshold in (0.05, 0.2):
+            bar = seconds(lambda some=some, t=threshold: gm.quality_at_least(*some, t), count)
+            rows.append((f"is Q_8 ≥ {threshold}? {what}", bar, "the value", one))
+        best = seconds(lambda some=some: gm.largest_quality(*some), count)
+        worst = seconds(lambda some=some: gm.smallest_quality(*some), count)
+        rows.append((f"the best of {count:,}, {what}", best, "all values", one))
+        rows.append((f"the worst of {count:,}, {what}", worst, "all values", one))
+    few = [array[:300] for array in stable]
+    circular = seconds(lambda: gm.circular_quality(*few), 300)
+    rows.append(("circular cones to 1e-3, 3 contacts, force closure", circular, "Q_8", value))
+    each = seconds(lambda: gm.quality(*few, norm="each"), 300)
+    rows.append(("Q'_8, 3 contacts, force closure", each, "Q_8", value))
+    return rows, (value, multiplication_rate())
+
+
+def uniform_rate():
+    """Time per grasp of the uniform mix, in a process with as many threads as it is given."""
+    mix = uniform_grasps(400_000, np.random.default_rng(0))
+    return seconds(lambda: gm.quality(*mix), len(mix[0]))
+
+
+def alone(work, threads):
+    """``work`` in a process with so many threads."""
+    names = ("RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
+    os.environ.update(dict.fromkeys(names, str(threads)))
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        result = pool.submit(work).result()
+    for name in names:
+        del os.environ[name]
+    return result
 
 
 def search_rows():
@@ -78,7 +141,7 @@ def search_rows():
     center = np.broadcast_to(surface.center_of_mass, (200, 3))
     theirs = qhull((points, normals, center), "QJ") * 1_313_400
     label = "a loop over SciPy ConvexHull QJ (extrapolated from 200 subsets)"
-    return [("best of C(200,3) = 1,313,400 subsets, all cores", label, theirs, ours)]
+    return [("best of C(200,3) = 1,313,400 subsets, all cores", ours, label, theirs)]
 
 
 def synthesis_rows():
@@ -122,9 +185,12 @@ def main():
     for column in ("what", "ours", "against", "its time", "ratio"):
         speed.add_column(column, justify="left" if column in ("what", "against") else "right")
     lines = ["| what | ours | against | its time | ratio |", "|---|---|---|---|---|"]
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
-        rows = [*alone.submit(kernel_rows).result(), *search_rows()]
-    for what, against, theirs, ours in rows:
+    cores = os.cpu_count() or 1
+    rows, (stable, rate) = alone(kernel_rows, 1)
+    one, many = alone(uniform_rate, 1), alone(uniform_rate, cores)
+    rows = [(f"{what}, one core", ours, against, theirs) for what, ours, against, theirs in rows]
+    rows.append((f"Q_8, 3 contacts, uniform D(1), {cores} cores", many, "one core", one))
+    for what, ours, against, theirs in [*rows, *search_rows()]:
         ratio = theirs / ours
         row = (
             what,
@@ -135,6 +201,14 @@ def main():
         )
         speed.add_row(*row)
         lines.append("| " + " | ".join(row) + " |")
+    count = operations(8)
+    bound = (
+        f"A force-closure grasp of three contacts takes {count:,} floating-point operations "
+        f"(docs/mathematics.md counts them). At the {rate / 1e9:.0f} GFlop/s at which BLAS "
+        f"multiplies matrices on one core of this machine that is {duration(count / rate)}; it "
+        f"takes {duration(stable)}, {count / rate / stable:.0%} of that rate."
+    )
+    lines += ["", bound]
     titles = (
         "surface", "best of 50", "best of 200", "synthesis, top 1",
         "time, all subsets of 50 / top 1", "the same / top 5", "time, top 1",
@@ -152,11 +226,48 @@ def main():
         lines.append("| " + " | ".join(row) + " |")
     console = Console()
     console.print(speed)
+    console.print(bound)
     console.print(figure)
     if target:
         machine = f"{platform.machine()}, {os.cpu_count()} cores"
         head = f"# Benchmarks\n\nWritten by `make bench` on {machine}. Ratios count, not seconds."
         target.write_text(head + "\n\n" + "\n".join(lines) + "\n")
+        write_degenerate(target.with_name("degenerate.md"))
+
+
+def write_degenerate(target):
+    """Degenerate grasps: the true quality, ours, and what Qhull says."""
+
+    def number(value):
+        return "0" if value == 0 else f"{value:.9g}"
+
+    def hull(case, options):
+        points = reference.wrenches(
+            case.contacts, np.asarray(case.normals, float), case.center, case.friction
+        )
+        try:
+            offset = -ConvexHull(points, qhull_options=options).equations[:, -1].max()
+        except QhullError as error:
+            return f"error {str(error).split()[0]}"
+        return number(offset)
+
+    lines = [
+        "# Degenerate grasps",
+        "",
+        "Q_8 with the unit of length as it is. Zeros are theorems (two contacts, collinear contacts,",
+        "no friction, a one-sided push); the others are from a hull with lengths of the order of 1,",
+        "mapped back. Qhull's joggle (`QJ`) makes small numbers, positive or not, out of zeros, so",
+        '"Q > 0" is decided by chance; its `Qt` stops with an error. Written by `make bench` and held',
+        "by `tests/test_quality.py`.",
+        "",
+        "| grasp | true | ours | Qhull QJ | Qhull Qt |",
+        "|---|---|---|---|---|",
+    ]
+    for case in CASES:
+        ours = gm.quality(case.contacts, case.normals, case.center, friction=case.friction)
+        cells = (case.name, number(case.truth()), number(ours), hull(case, "QJ"), hull(case, "Qt"))
+        lines.append("| " + " | ".join(cells) + " |")
+    target.write_text("\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
