@@ -120,7 +120,7 @@ def synthesize(
         Everywhere if not given.
     starts
         How many grasps of the heuristic are followed: more find better ones, and take longer.
-        ``top + 2`` if not given.
+        ``top + 1`` if not given.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def synthesize(
     """
     mu, l = cone(friction, edges)
     top = count("top", top, 1)
-    followed = top + 2 if starts is None else count("starts", starts, 1)
+    followed = top + 1 if starts is None else count("starts", starts, 1)
     cells: NDArray[np.bool_] | None = None
     if allowed is not None:
         cells = np.ascontiguousarray(allowed, dtype=np.bool_)

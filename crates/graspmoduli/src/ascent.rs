@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 pub type Coordinates = [[f64; 2]; 3];
 
 /// Facets looked at per step: more than ever meet in a point.
-const MOST_FACETS: usize = 12;
+const MOST_FACETS: usize = 8;
 
 /// Where contacts may lie.
 pub trait Region: Sync {

@@ -35,7 +35,7 @@ const ON_THE_WAY: Effort = Effort {
 };
 /// On S, to tell good starts from bad ones.
 const APPROACH: Effort = Effort {
-    steps: 4,
+    steps: 3,
     gain: 1e-2,
 };
 /// To the local maximum.
@@ -59,6 +59,29 @@ pub struct Synthesized {
 /// If the deformation from π(S) finds fewer than three grasps, the ascent also starts from the best
 /// triples of area-uniform samples; `square` holds points of the unit square to make them of.
 pub fn synthesize(
+    surface: &Surface,
+    center_of_mass: DVec3,
+    cone: &FrictionCone,
+    region: &dyn Region,
+    top: usize,
+    most_starts: usize,
+    square: &[[f64; 2]],
+) -> Result<Vec<Synthesized>, Error> {
+    // Within the thread pool from the start: entering it once per stage costs as much as a stage.
+    rayon::scope(|_| {
+        within_pool(
+            surface,
+            center_of_mass,
+            cone,
+            region,
+            top,
+            most_starts,
+            square,
+        )
+    })
+}
+
+fn within_pool(
     surface: &Surface,
     center_of_mass: DVec3,
     cone: &FrictionCone,
@@ -195,7 +218,7 @@ fn best_heights(
         .filter(wanted)
         .map(|[a, b, c]| [a, HEIGHTS + b, 2 * HEIGHTS + c]);
     let mut best: Best<[f64; 3]> = Best::new(most);
-    for ranked in best_of(&contacts, center, cone, 3 * most, triples) {
+    for ranked in best_of(&contacts, center, cone, 2 * most, triples) {
         let heights = ranked.indices.map(|i| height(i % HEIGHTS));
         // Grasps at neighbouring heights climb to the same place.
         best.insert(heights, ranked.quality, |x, y| {

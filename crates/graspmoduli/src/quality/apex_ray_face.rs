@@ -82,6 +82,16 @@ impl Kernel {
                 self.heights(simd, roles, block, row);
             }
         }
+        if let Question::All(..) = question {
+            for row in 0..self.squares.len() {
+                for lane in 0..LANES {
+                    if self.squares[row][lane] > *limit * (1.0 - TIE) {
+                        self.offer_end(row, lane, question, limit)?;
+                    }
+                }
+            }
+            return ControlFlow::Continue(());
+        }
         // The longest first: it leaves little to do for the others.
         loop {
             let longest = self.longest_square(simd);
@@ -96,9 +106,7 @@ impl Kernel {
                 return ControlFlow::Continue(());
             };
             self.squares[row][lane] = 0.0;
-            let roles = ROLES[row / (2 * blocks)];
-            let j = row / 2 % blocks * LANES + lane;
-            self.offer_end(roles, j, row % 2 == 0, question, limit)?;
+            self.offer_end(row, lane, question, limit)?;
         }
     }
 
@@ -215,16 +223,19 @@ impl Kernel {
         }
     }
 
-    /// One end of the interval of heights, as in [`Kernel::heights`].
+    /// The candidate of one of `squares`, computed as in [`Kernel::heights`].
     #[inline(always)]
     fn offer_end(
         &mut self,
-        roles: [usize; 3],
-        j: usize,
-        top: bool,
+        row: usize,
+        lane: usize,
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
+        let blocks = self.plane.edges.div_ceil(LANES);
+        let roles = ROLES[row / (2 * blocks)];
+        let j = row / 2 % blocks * LANES + lane;
+        let top = row % 2 == 0;
         let [apex, other, face] = roles;
         let held = self.hold(roles, j);
         let bounds = &self.bounds[face];
