@@ -28,6 +28,16 @@ from degenerate import CASES  # noqa: E402
 
 REPEATS = 5
 
+DEGENERATE = """\
+# Degenerate grasps
+
+Q_8 with the unit of length as it is. Zeros are theorems (two contacts, collinear contacts, no
+friction, a one-sided push); the others are from a hull with lengths of the order of 1, mapped back.
+Qhull's joggle (`QJ`) makes small numbers, positive or not, out of zeros, so "Q > 0" is decided by
+chance; its `Qt` stops with an error. Written by `make bench` and held by `tests/test_quality.py`.
+
+"""
+
 
 def seconds(work, amount, repeats=REPEATS):
     """Median over repeats of the time per unit of work."""
@@ -252,16 +262,9 @@ def write_degenerate(target):
         return number(offset)
 
     lines = [
-        "# Degenerate grasps",
-        "",
-        "Q_8 with the unit of length as it is. Zeros are theorems (two contacts, collinear contacts,",
-        "no friction, a one-sided push); the others are from a hull with lengths of the order of 1,",
-        "mapped back. Qhull's joggle (`QJ`) makes small numbers, positive or not, out of zeros, so",
-        '"Q > 0" is decided by chance; its `Qt` stops with an error. Written by `make bench` and held',
-        "by `tests/test_quality.py`.",
-        "",
+        *DEGENERATE.splitlines(),
         "| grasp | true | ours | Qhull QJ | Qhull Qt |",
-        "|---|---|---|---|---|",
+        "|" + "---|" * 5,
     ]
     for case in CASES:
         ours = gm.quality(case.contacts, case.normals, case.center, friction=case.friction)

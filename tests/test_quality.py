@@ -171,7 +171,7 @@ class TestThresholds:
         for threshold in (-1.0, 0.0, 1e-3, 0.05, 0.2, float(np.median(q[q > 0]))):
             answers = gm.quality_at_least(*grasps, threshold)
             np.testing.assert_array_equal(answers, q >= threshold)
-        assert gm.quality_at_least(*(a[0] for a in grasps), 0.0) is True
+        assert gm.quality_at_least(*(a[0] for a in grasps), threshold=0.0) is True
 
     @pytest.mark.parametrize("m", [3, 4])
     def test_the_best_and_the_worst(self, m):

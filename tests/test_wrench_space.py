@@ -59,6 +59,7 @@ def test_disturbances_up_to_the_quality_are_resisted_and_the_weakest_no_further(
             found = space.resist(wrench)
             assert found.normal_force <= 1.0 / space.quality * (1 + 1e-9)
             forces = found.forces
+            assert forces is not None
             torque = np.cross(contacts - center, forces).sum(0)
             np.testing.assert_allclose(np.hstack([forces.sum(0), torque]), -wrench, atol=1e-8)
             along = (forces * normals).sum(1)
@@ -77,11 +78,13 @@ def test_what_cannot_be_resisted_comes_with_a_proof():
     assert turning.normal_force == np.inf
     for load in ([0, 0, 0, 1, 0, 0], [1, 2, 3, 4, 5, 6]):
         proof = space.resist(load).proof
+        assert proof is not None
         assert proof @ load > 1e-6
         assert (space.wrenches @ proof >= -1e-9).all()
     soft = gm.WrenchSpace(SQUEEZE, SQUEEZE_NORMALS, ORIGIN, torsion=0.1)
-    found = soft.resist([0, 0, 0, 1, 0, 0])
-    np.testing.assert_allclose((found.torques[:, None] * soft.normals).sum(0), [-1, 0, 0])
+    torques = soft.resist([0, 0, 0, 1, 0, 0]).torques
+    assert torques is not None
+    np.testing.assert_allclose((torques[:, None] * soft.normals).sum(0), [-1, 0, 0])
 
 
 def test_numbers_for_comparison():

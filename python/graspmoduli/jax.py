@@ -1,7 +1,5 @@
 """Q_l as a differentiable function of JAX arrays: ``pip install 'graspmoduli[jax]'``."""
 
-# pyright: reportMissingImports=false, reportUntypedFunctionDecorator=false
-
 from __future__ import annotations
 
 from functools import partial

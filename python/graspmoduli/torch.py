@@ -1,7 +1,5 @@
 """Q_l as a differentiable function of PyTorch tensors: ``pip install 'graspmoduli[torch]'``."""
 
-# pyright: reportMissingImports=false, reportUntypedFunctionDecorator=false
-
 from __future__ import annotations
 
 from typing import Any

@@ -235,7 +235,7 @@ impl Kernel {
         let blocks = self.plane.edges.div_ceil(LANES);
         let roles = ROLES[row / (2 * blocks)];
         let j = row / 2 % blocks * LANES + lane;
-        let top = row % 2 == 0;
+        let top = row.is_multiple_of(2);
         let [apex, other, face] = roles;
         let held = self.hold(roles, j);
         let bounds = &self.bounds[face];
