@@ -23,7 +23,8 @@ test: $(READY) ## Every test, Rust and Python
 	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py python tests
 
 test-extras: $(READY) ## The tests of torch and jax: installs both, several gigabytes
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[torch,jax]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
+	    --editable '.[torch,jax]'
 	$(BIN)/pytest tests/extras
 
 lint: $(READY) ## Formatting, clippy, ruff and types

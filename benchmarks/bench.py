@@ -72,7 +72,7 @@ def multiplication_rate():
     """Floating-point operations per second of BLAS on one core, multiplying matrices."""
     n = 512
     a = np.random.default_rng(0).random((n, n))
-    a @ a
+    np.matmul(a, a)
     return 2 * n**3 / min(seconds(lambda: a @ a, 1, repeats=1) for _ in range(20))
 
 
@@ -110,7 +110,9 @@ def kernel_rows():
         slope = seconds(lambda some=some: gm.quality_gradient(*some), count)
         rows.append((f"Q_8, {what}", one, "value and exact gradient", slope))
         for threshold in (0.05, 0.2):
-            bar = seconds(lambda some=some, t=threshold: gm.quality_at_least(*some, t), count)
+            bar = seconds(
+                lambda some=some, t=threshold: gm.quality_at_least(*some, threshold=t), count
+            )
             rows.append((f"is Q_8 ≥ {threshold}? {what}", bar, "the value", one))
         best = seconds(lambda some=some: gm.largest_quality(*some), count)
         worst = seconds(lambda some=some: gm.smallest_quality(*some), count)
