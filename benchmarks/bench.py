@@ -5,6 +5,7 @@ python benchmarks/bench.py [--markdown FILE]
 
 import argparse
 import itertools
+import math
 import multiprocessing
 import os
 import platform
@@ -145,15 +146,19 @@ def alone(work, threads):
 
 def search_rows():
     surface = gm.shapes.MODELS["g"]
-    u, theta = gm.sample_points(surface, 200, seed=0)
-    ours = seconds(lambda: gm.best_grasps(surface, u, theta), 1)
     rng = np.random.default_rng(0)
-    index = np.array([rng.choice(200, 3, replace=False) for _ in range(200)])
-    points, normals = surface.points(u, theta)[index], surface.normals(u, theta)[index]
-    center = np.broadcast_to(surface.center_of_mass, (200, 3))
-    theirs = qhull((points, normals, center), "QJ") * 1_313_400
-    label = "a loop over SciPy ConvexHull QJ (extrapolated from 200 subsets)"
-    return [("best of C(200,3) = 1,313,400 subsets, all cores", ours, label, theirs)]
+    rows = []
+    for n, m, sampled in ((200, 3, 200), (60, 4, 60)):
+        u, theta = gm.sample_points(surface, n, seed=0)
+        ours = seconds(lambda u=u, t=theta, m=m: gm.best_grasps(surface, u, t, contacts=m), 1)
+        index = np.array([rng.choice(n, m, replace=False) for _ in range(sampled)])
+        points, normals = surface.points(u, theta)[index], surface.normals(u, theta)[index]
+        center = np.broadcast_to(surface.center_of_mass, (sampled, 3))
+        count = math.comb(n, m)
+        theirs = qhull((points, normals, center), "QJ") * count
+        label = f"a loop over SciPy ConvexHull QJ (extrapolated from {sampled} subsets)"
+        rows.append((f"best of C({n},{m}) = {count:,} subsets, all cores", ours, label, theirs))
+    return rows
 
 
 def synthesis_rows():

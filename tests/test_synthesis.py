@@ -77,6 +77,21 @@ class TestSearch:
         wanted = np.sort(q)[::-1][:5]
         np.testing.assert_array_equal([b.quality for b in best], wanted[wanted > 0])
 
+    @pytest.mark.parametrize("m", [2, 4, 5])
+    def test_other_hands(self, m):
+        surface = gm.shapes.MODELS["f"]
+        u, theta = gm.sample_points(surface, 12, seed=5)
+        index = np.array(list(itertools.combinations(range(12), m)))
+        points, normals = surface.points(u, theta), surface.normals(u, theta)
+        q = gm.quality(points[index], normals[index], surface.center_of_mass)
+        best = gm.best_grasps(surface, u, theta, contacts=m, top=10)
+        wanted = np.sort(q)[::-1][:10]
+        np.testing.assert_array_equal([b.quality for b in best], wanted[wanted > 0])
+        for ranked, chosen in zip(best, index[np.argsort(-q, kind="stable")], strict=False):
+            np.testing.assert_array_equal(ranked.grasp.u, u[chosen])
+        again = gm.best_grasps(surface, u, theta, contacts=m, top=10, threads=1)
+        assert again == best
+
     def test_the_number_of_threads_changes_nothing(self):
         surface = gm.shapes.MODELS["e"]
         u, theta = gm.sample_points(surface, 90, seed=8)
@@ -103,7 +118,8 @@ class TestSearch:
     @pytest.mark.parametrize(
         ("options", "sentence"),
         [
-            ({"contacts": 4}, "contacts must be 3 in this version, got 4"),
+            ({"contacts": 4}, "at least 4 contacts, got 3"),
+            ({"contacts": 0}, "contacts must be at least 1"),
             ({"top": 0}, "top must be at least 1"),
             ({"threads": 0}, "threads must be at least 1"),
             ({"friction": 0}, "friction must be a positive"),

@@ -81,12 +81,13 @@ class Surface:
 
 def combine(weights: Sequence[float], surfaces: Sequence[Surface]) -> Surface: ...
 def sample_points(surface: Surface, square: Floats) -> Floats: ...
-def best_triples(
+def best_subsets(
     contacts: Floats,
     normals: Floats,
     center_of_mass: tuple[float, float, float],
     friction: float,
     edges: int,
+    size: int,
     top: int,
     threads: int,
     progress: Callable[[int, int], object] | None,

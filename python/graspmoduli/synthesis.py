@@ -41,7 +41,7 @@ def best_grasps(
     u, theta
         Contact coordinates. Shape (n,).
     contacts
-        Contacts per grasp; 3 in this version.
+        Contacts per grasp. Three are by far the fastest; fewer are never force closure.
     top
         How many grasps to return. Fewer come back if fewer are force closure.
     friction, edges
@@ -63,18 +63,18 @@ def best_grasps(
     us, thetas, shape = coordinates(u, theta)
     if len(shape) != 1:
         raise GraspModuliError(f"u and theta must have shape (n,), got {shape}")
-    if count("contacts", contacts, 1) != 3:
-        raise GraspModuliError(f"contacts must be 3 in this version, got {contacts}")
-    if us.size < 3:
-        raise GraspModuliError(f"u and theta must hold at least 3 contacts, got {us.size}")
+    size = count("contacts", contacts, 1)
+    if us.size < size:
+        raise GraspModuliError(f"u and theta must hold at least {size} contacts, got {us.size}")
     top = count("top", top, 1)
     workers = _cores() if threads is None else count("threads", threads, 1)
-    ranked = _core.best_triples(
+    ranked = _core.best_subsets(
         np.ascontiguousarray(surface.points(us, thetas)),
         np.ascontiguousarray(surface.normals(us, thetas)),
         _center(surface, center_of_mass),
         mu,
         l,
+        size,
         top,
         workers,
         progress,

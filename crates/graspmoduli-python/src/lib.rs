@@ -329,21 +329,22 @@ fn sample_points<'py>(
     table(py, points)
 }
 
-/// The best of all triples of n contacts: indices and qualities. `progress` is called with the
-/// numbers of triples done and in all.
+/// The best of all subsets of `size` of n contacts: indices and qualities. `progress` is called with
+/// the numbers of subsets done and in all.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn best_triples<'py>(
+fn best_subsets<'py>(
     py: Python<'py>,
     contacts: PyReadonlyArray2<'py, f64>,
     normals: PyReadonlyArray2<'py, f64>,
     center_of_mass: [f64; 3],
     friction: f64,
     edges: usize,
+    size: usize,
     top: usize,
     threads: usize,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Vec<([usize; 3], f64)>> {
+) -> PyResult<Vec<(Vec<usize>, f64)>> {
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
     let contacts = single(&contacts, &normals)?;
     let mut failure = None;
@@ -364,7 +365,7 @@ fn best_triples<'py>(
             }
         };
         let center = center_of_mass.into();
-        search::best_triples(&contacts, center, &cone, top, threads, report)
+        search::best_subsets(&contacts, center, &cone, size, top, threads, report)
     });
     match (result, failure) {
         (Ok(ranked), _) => Ok(ranked.into_iter().map(|r| (r.indices, r.quality)).collect()),
@@ -424,7 +425,7 @@ fn synthesize<'py>(
 mod _core {
     #[pymodule_export]
     use super::{
-        GraspModuliError, Surface, best_triples, circular_quality, combine, extreme_quality,
+        GraspModuliError, Surface, best_subsets, circular_quality, combine, extreme_quality,
         is_clean, quality, quality_at_least, quality_gradient, sample_points, synthesize, weakest,
     };
 }

@@ -19,7 +19,7 @@
 //! | [`quality`] | exact $Q_l$ and its gradient |
 //! | [`surface`] | spline surfaces: points, normals, integrals, convex-cone operations |
 //! | [`sampling`] | area-uniform points |
-//! | [`search`] | the best of all triples of contacts |
+//! | [`search`] | the best of all subsets of contacts |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
 //! | [`error`] | what can be wrong with a request |

@@ -1,14 +1,14 @@
-//! The best of all triples of given contacts, exactly, without evaluating most of them.
+//! The best of all subsets of given contacts, exactly, without evaluating most of them.
 //!
 //! For any unit twist v, h(v) = max_ij ⟨v, w_ij⟩ bounds Q from above, and the maximum over a
-//! triple is that of its contacts' own maxima, which depend on the contact and v alone. So a table
+//! subset is that of its contacts' own maxima, which depend on the contact and v alone. So a table
 //! of these maxima for a few hundred directions answers "is Q below the best so far?" for most
-//! triples by the conjunction of three bit masks. The directions are those in which earlier
-//! triples failed.
+//! subsets by the conjunction of a bit mask per contact. The directions are those in which earlier
+//! subsets failed.
 
 use crate::contact::{Contact, Frame, FrictionCone};
 use crate::error::Error;
-use crate::quality::{Kernel, Twist, quality_of};
+use crate::quality::{Evaluator, Twist, Weakest};
 use glam::DVec3;
 use multiversion::multiversion;
 use std::ops::ControlFlow;
@@ -24,35 +24,36 @@ const DIRECTIONS: usize = 64 * WORDS;
 /// Between two calls of the progress function.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Three of the given contacts, by index, and their Q_l.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Some of the given contacts, by index, and their Q_l.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ranked {
     /// Q_l > 0.
     pub quality: f64,
     /// Ascending indices of the contacts.
-    pub indices: [usize; 3],
+    pub indices: Vec<usize>,
 }
 
-/// The `top` best force-closure grasps among all triples of `contacts`, best first, equal ones by
-/// their indices; fewer if there are fewer. The result does not depend on `threads`.
+/// The `top` best force-closure grasps among all subsets of `size` of the `contacts`, best first,
+/// equal ones by their indices; fewer if there are fewer. The result does not depend on `threads`.
 ///
 /// `progress(done, total)` is called now and then and at the end from the calling thread, in
-/// triples, and may ask to stop: then the answer is [`Error::Interrupted`].
-pub fn best_triples(
+/// subsets, and may ask to stop: then the answer is [`Error::Interrupted`].
+pub fn best_subsets(
     contacts: &[Contact],
     center_of_mass: DVec3,
     cone: &FrictionCone,
+    size: usize,
     top: usize,
     threads: usize,
     mut progress: impl FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Result<Vec<Ranked>, Error> {
     let n = contacts.len();
-    let total = triples(n);
-    if total == 0 || top == 0 {
+    let total = subsets(n, size);
+    if size == 0 || total == 0 || top == 0 {
         return Ok(Vec::new());
     }
     let board = Board::new(top);
-    let mut first = Worker::new(contacts, center_of_mass, cone, &board);
+    let mut first = Worker::new(contacts, center_of_mass, cone, size, &board);
     first.seed(total);
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
@@ -62,11 +63,11 @@ pub fn best_triples(
     let work = |mut worker: Worker| {
         loop {
             let a = next.fetch_add(1, Ordering::Relaxed);
-            if a + 2 >= n || stop.load(Ordering::Relaxed) {
+            if a + size > n || stop.load(Ordering::Relaxed) {
                 break;
             }
-            worker.all_with_first(a, &stop);
-            done.fetch_add(triples(n - a) - triples(n - a - 1), Ordering::Relaxed);
+            worker.all_from(&mut vec![a], &stop);
+            done.fetch_add(subsets(n - a - 1, size - 1), Ordering::Relaxed);
         }
         *running.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
         finished.notify_one();
@@ -116,19 +117,24 @@ pub(crate) fn best_of(
     triples: impl Iterator<Item = [usize; 3]>,
 ) -> Vec<Ranked> {
     let board = Board::new(top);
-    let mut worker = Worker::new(contacts, center_of_mass, cone, &board);
-    for triple in triples {
-        if worker.may_enter(triple) {
-            worker.evaluate(triple);
+    let mut worker = Worker::new(contacts, center_of_mass, cone, 3, &board);
+    for mut triple in triples {
+        if worker.may_enter(&triple) {
+            worker.evaluate(&mut triple);
         }
     }
     board.into_best()
 }
 
-/// n choose 3.
-fn triples(n: usize) -> u64 {
-    let n = n as u64;
-    if n < 3 { 0 } else { n * (n - 1) * (n - 2) / 6 }
+/// n choose k, or the largest number if it is more.
+fn subsets(n: usize, k: usize) -> u64 {
+    if k > n {
+        return 0;
+    }
+    let product = (0..k.min(n - k) as u128).try_fold(1u128, |product, i| {
+        product.checked_mul(n as u128 - i).map(|p| p / (i + 1))
+    });
+    product.map_or(u64::MAX, |p| u64::try_from(p).unwrap_or(u64::MAX))
 }
 
 /// The best so far, shared by all workers.
@@ -155,7 +161,7 @@ impl Board {
     fn offer(&self, candidate: Ranked) {
         let mut best = self.best.lock().unwrap_or_else(PoisonError::into_inner);
         let place = best.partition_point(|other| {
-            (-other.quality, other.indices) < (-candidate.quality, candidate.indices)
+            (-other.quality, &other.indices) < (-candidate.quality, &candidate.indices)
         });
         if best
             .get(place)
@@ -183,7 +189,10 @@ struct Worker<'a> {
     contacts: &'a [Contact],
     center: DVec3,
     board: &'a Board,
-    kernel: Kernel,
+    evaluator: Evaluator,
+    /// Contacts per grasp, and those of the grasp that is evaluated.
+    size: usize,
+    grasp: Vec<Contact>,
     /// Wrenches of all contacts, `edges` each.
     wrenches: Vec<Twist>,
     edges: usize,
@@ -199,7 +208,13 @@ struct Worker<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(contacts: &'a [Contact], center: DVec3, cone: &FrictionCone, board: &'a Board) -> Self {
+    fn new(
+        contacts: &'a [Contact],
+        center: DVec3,
+        cone: &FrictionCone,
+        size: usize,
+        board: &'a Board,
+    ) -> Self {
         let wrenches: Vec<Twist> = contacts
             .iter()
             .flat_map(|contact| {
@@ -219,10 +234,13 @@ impl<'a> Worker<'a> {
             contacts,
             center,
             board,
-            kernel: Kernel::new(cone),
+            evaluator: Evaluator::new(cone),
+            size,
+            grasp: Vec::new(),
             wrenches,
             edges: cone.len(),
-            margin: 1e-13 * longest,
+            // The closed form errs by rounding, the expanding polytope by its perturbation.
+            margin: longest * if size == 3 { 1e-13 } else { 1e-10 },
             supports: Vec::new(),
             oldest: 0,
             masks: vec![[0; WORDS]; contacts.len()],
@@ -230,7 +248,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// A first threshold and first directions: some triples spread over all, then the best of
+    /// A first threshold and first directions: some subsets spread over all, then the best of
     /// them improved by exchanging one contact at a time.
     fn seed(&mut self, total: u64) {
         let n = self.contacts.len();
@@ -242,19 +260,19 @@ impl<'a> Worker<'a> {
                 .wrapping_add(1442695040888963407);
             ((state >> 33) as usize) % n
         };
-        let mut best = (0.0, [0, 1, 2]);
+        let mut best = (0.0, (0..self.size).collect::<Vec<_>>());
         for _ in 0..(total / 16).min(512) {
-            let indices = [draw(), draw(), draw()];
-            let quality = self.evaluate(indices);
+            let mut indices: Vec<usize> = (0..self.size).map(|_| draw()).collect();
+            let quality = self.evaluate(&mut indices);
             if quality > best.0 {
                 best = (quality, indices);
             }
         }
-        for slot in (0..3).cycle().take(6) {
+        for slot in (0..self.size).cycle().take(2 * self.size) {
             for other in 0..n {
-                let mut indices = best.1;
+                let mut indices = best.1.clone();
                 indices[slot] = other;
-                let quality = self.evaluate(indices);
+                let quality = self.evaluate(&mut indices);
                 if quality > best.0 {
                     best = (quality, indices);
                 }
@@ -262,57 +280,83 @@ impl<'a> Worker<'a> {
         }
     }
 
-    fn all_with_first(&mut self, a: usize, stop: &AtomicBool) {
+    /// All subsets that begin with the chosen ones, which ascend.
+    fn all_from(&mut self, chosen: &mut Vec<usize>, stop: &AtomicBool) {
         let n = self.contacts.len();
-        for b in a + 1..n - 1 {
-            if stop.load(Ordering::Relaxed) {
-                return;
-            }
-            let mut c = b + 1;
-            loop {
-                // A new threshold or direction changes the masks: look at them afresh each time.
-                let pair = std::array::from_fn(|w| self.masks[a][w] & self.masks[b][w]);
-                c = first_open(&pair, &self.masks, c);
-                if c == n {
-                    break;
+        let last = chosen[chosen.len() - 1];
+        if chosen.len() == self.size {
+            self.evaluate(chosen);
+            return;
+        }
+        if chosen.len() + 1 < self.size {
+            for next in last + 1..n {
+                if stop.load(Ordering::Relaxed) {
+                    return;
                 }
-                self.evaluate([a, b, c]);
-                c += 1;
+                chosen.push(next);
+                self.all_from(chosen, stop);
+                chosen.pop();
             }
+            return;
+        }
+        let mut next = last + 1;
+        loop {
+            // A new threshold or direction changes the masks: look at them afresh each time.
+            let common = self.common(chosen);
+            next = first_open(&common, &self.masks, next);
+            if next == n {
+                break;
+            }
+            chosen.push(next);
+            self.evaluate(chosen);
+            chosen.pop();
+            next += 1;
         }
     }
 
-    /// Is there no direction in which the triple is known to stay below the threshold?
-    fn may_enter(&self, [a, b, c]: [usize; 3]) -> bool {
-        let [a, b, c] = [a, b, c].map(|i| &self.masks[i]);
-        (0..WORDS).all(|w| a[w] & b[w] & c[w] == 0)
+    /// Directions in which all these contacts stay below the threshold.
+    fn common(&self, indices: &[usize]) -> Mask {
+        let mut common = [u64::MAX; WORDS];
+        for &index in indices {
+            for (word, own) in common.iter_mut().zip(&self.masks[index]) {
+                *word &= own;
+            }
+        }
+        common
     }
 
-    /// Q of three contacts if it reaches the threshold, else 0; tells the board.
-    fn evaluate(&mut self, mut indices: [usize; 3]) -> f64 {
+    /// Is there no direction in which the grasp is known to stay below the threshold?
+    fn may_enter(&self, indices: &[usize]) -> bool {
+        self.common(indices) == [0; WORDS]
+    }
+
+    /// Q of some contacts if it reaches the threshold, else 0; tells the board. Sorts them.
+    fn evaluate(&mut self, indices: &mut [usize]) -> f64 {
         indices.sort_unstable();
-        let [a, b, c] = indices;
-        if a == b || b == c {
+        if indices.windows(2).any(|pair| pair[0] == pair[1]) {
             return 0.0;
         }
         if self.board.threshold() > self.threshold {
             self.raise_threshold();
         }
-        let grasp = indices.map(|i| self.contacts[i]);
-        let Some(vertex) = self
-            .kernel
-            .longest_up_to(&grasp, self.center, self.threshold)
-        else {
+        self.grasp.clear();
+        self.grasp.extend(indices.iter().map(|&i| self.contacts[i]));
+        let weakest = self
+            .evaluator
+            .weakest_up_to(&self.grasp, self.center, self.threshold);
+        let Some(Weakest { quality, direction }) = weakest else {
             return 0.0;
         };
-        let quality = quality_of(vertex);
-        if quality < self.threshold {
-            self.add_direction(vertex.twist.map(|x| x * quality));
+        if quality < self.threshold || quality == 0.0 {
+            self.add_direction(direction);
             return 0.0;
         }
-        self.board.offer(Ranked { quality, indices });
+        self.board.offer(Ranked {
+            quality,
+            indices: indices.to_vec(),
+        });
         if self.supports.len() < DIRECTIONS {
-            self.add_direction(vertex.twist.map(|x| x * quality));
+            self.add_direction(direction);
         }
         quality
     }

@@ -11,7 +11,7 @@ use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::Evaluator;
 use crate::sampling::by_area;
-use crate::search::{best_of, best_triples};
+use crate::search::{Ranked, best_of, best_subsets};
 use crate::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -132,12 +132,12 @@ fn within_pool(
             .iter()
             .map(|&[u, theta]| surface.contact(u, theta))
             .collect();
-        let triples = best_triples(&contacts, center_of_mass, cone, 8 * top, 1, |_, _| {
+        let triples = best_subsets(&contacts, center_of_mass, cone, 3, 8 * top, 1, |_, _| {
             ControlFlow::Continue(())
         })?;
         let triples = triples
             .into_iter()
-            .map(|ranked| (ranked.indices.map(|i| samples[i]), ranked.quality))
+            .map(|ranked| (three(&ranked).map(|i| samples[i]), ranked.quality))
             .collect();
         let triples = different(&target, triples, apart, top);
         found.par_extend(
@@ -193,6 +193,10 @@ fn starts(target: &Climber, cone: &FrictionCone, most: usize) -> Vec<Coordinates
     best.entries.into_iter().map(|(at, _)| at).collect()
 }
 
+fn three(ranked: &Ranked) -> [usize; 3] {
+    std::array::from_fn(|i| ranked.indices[i])
+}
+
 fn height(index: usize) -> f64 {
     index as f64 / (HEIGHTS - 1) as f64
 }
@@ -219,7 +223,7 @@ fn best_heights(
         .map(|[a, b, c]| [a, HEIGHTS + b, 2 * HEIGHTS + c]);
     let mut best: Best<[f64; 3]> = Best::new(most);
     for ranked in best_of(&contacts, center, cone, 2 * most, triples) {
-        let heights = ranked.indices.map(|i| height(i % HEIGHTS));
+        let heights = three(&ranked).map(|i| height(i % HEIGHTS));
         // Grasps at neighbouring heights climb to the same place.
         best.insert(heights, ranked.quality, |x, y| {
             (0..3).all(|i| (x[i] - y[i]).abs() < 1.5 / (HEIGHTS - 1) as f64)

@@ -111,6 +111,41 @@ impl Evaluator {
         }
     }
 
+    /// As [`Evaluator::weakest`] if Q_l is at least `threshold`; else some unit direction in which
+    /// the hull reaches less far than that. `None` where Q_l = 0 and no direction is known.
+    pub(crate) fn weakest_up_to(
+        &mut self,
+        contacts: &[Contact],
+        center_of_mass: DVec3,
+        threshold: f64,
+    ) -> Option<Weakest> {
+        let Some(three) = self.closed_form(contacts) else {
+            let below = |_, upper| upper < threshold;
+            let distance = self.distance(contacts, center_of_mass, Norm::Sum, below);
+            return (distance != Distance::ZERO).then(|| self.unscaled(&distance));
+        };
+        let vertex = self
+            .kernel
+            .longest_up_to(three, center_of_mass, threshold)?;
+        let quality = quality_of(vertex);
+        Some(Weakest {
+            quality,
+            direction: vertex.twist.map(|x| x * quality),
+        })
+    }
+
+    /// The distance with its direction in the object frame.
+    fn unscaled(&self, distance: &Distance) -> Weakest {
+        let scale = self.wrenches.scale;
+        let [a, b, c, d, e, f] = distance.direction;
+        let direction = [a, b, c, d / scale, e / scale, f / scale];
+        let length = polytope::dot(&direction, &direction).sqrt();
+        Weakest {
+            quality: distance.upper,
+            direction: direction.map(|x| x / length),
+        }
+    }
+
     /// Q_l if it is below `threshold`, else `threshold`.
     #[inline]
     fn quality_below(
@@ -177,14 +212,11 @@ impl Evaluator {
             };
         }
         let distance = self.polytope.distance(&self.wrenches, scale, never);
-        let [a, b, c, d, e, f] = distance.direction;
-        let direction = [a, b, c, d / scale, e / scale, f / scale];
-        let length = polytope::dot(&direction, &direction).sqrt();
-        let too_few = self.too_few(contacts);
-        Weakest {
-            quality: if too_few { 0.0 } else { distance.upper },
-            direction: direction.map(|x| x / length),
+        let mut weakest = self.unscaled(&distance);
+        if self.too_few(contacts) {
+            weakest.quality = 0.0;
         }
+        weakest
     }
 
     /// Lower and upper bound of the quality with exact circular cones, which meet to `tolerance`
