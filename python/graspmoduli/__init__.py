@@ -6,6 +6,8 @@ many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
+the moduli space       :func:`interpolate`, :func:`placed_distance`, :func:`transfer`,
+                       :func:`sample_combinations`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
 errors                 :class:`GraspModuliError`
@@ -28,6 +30,12 @@ from .grasps import PlacedGrasp as PlacedGrasp
 from .grasps import RankedGrasp as RankedGrasp
 from .grasps import grasp_gradient as grasp_gradient
 from .grasps import place as place
+from .moduli import Transfer as Transfer
+from .moduli import interpolate as interpolate
+from .moduli import placed_distance as placed_distance
+from .moduli import sample_combinations as sample_combinations
+from .moduli import sample_weights as sample_weights
+from .moduli import transfer as transfer
 from .quality import Bounds as Bounds
 from .quality import Extreme as Extreme
 from .quality import QualityGradient as QualityGradient

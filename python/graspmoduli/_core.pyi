@@ -102,3 +102,22 @@ def synthesize(
     square: Floats,
     allowed: NDArray[np.bool_] | None,
 ) -> Floats: ...
+
+Transferred = tuple[Floats, Floats, int]
+
+class Deformation:
+    def __new__(cls, source: Surface, target: Surface) -> Deformation: ...
+    def naive(
+        self, grasps: Floats, friction: float, edges: int, samples: int
+    ) -> list[Transferred]: ...
+    def by_gradient(
+        self,
+        grasps: Floats,
+        friction: float,
+        edges: int,
+        surfaces: int,
+        steps: int,
+        length: float,
+        difference: float | None,
+    ) -> list[Transferred]: ...
+    def by_ascent(self, grasps: Floats, friction: float, edges: int) -> list[Transferred]: ...

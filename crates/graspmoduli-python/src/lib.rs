@@ -7,6 +7,7 @@ use graspmoduli::error::Error;
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use graspmoduli::search;
 use graspmoduli::synthesis;
+use graspmoduli::transfer::{Carried, Deformation, Schedule};
 use graspmoduli::{sampling, surface};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -420,12 +421,101 @@ fn synthesize<'py>(
     table(py, rows.collect())
 }
 
+/// A grasp carried to another surface: coordinates (m, 2), path (k, 2) of t and Q_l, evaluations.
+type Transferred<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, usize);
+
+/// The surfaces between two.
+#[pyclass(frozen, name = "Deformation")]
+struct PyDeformation(Deformation);
+
+#[pymethods]
+impl PyDeformation {
+    #[new]
+    fn new(py: Python<'_>, source: Py<Surface>, target: Py<Surface>) -> PyResult<Self> {
+        py.detach(|| Deformation::new(&source.get().0, &target.get().0))
+            .map(Self)
+            .map_err(raise)
+    }
+
+    /// The naïve transfer of n grasps, (n, m, 2), with Q_l at `samples` + 1 values of t.
+    fn naive<'py>(
+        &self,
+        py: Python<'py>,
+        grasps: PyReadonlyArray3<'py, f64>,
+        friction: f64,
+        edges: usize,
+        samples: usize,
+    ) -> PyResult<Vec<Transferred<'py>>> {
+        let cone = cone(friction, edges, 0.0)?;
+        let grasps = coordinates(&grasps)?;
+        let carried = py.detach(|| self.0.naive(&grasps, &cone, samples));
+        transferred(py, carried)
+    }
+
+    /// The gradient method of Sec. IV.D.
+    #[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+    fn by_gradient<'py>(
+        &self,
+        py: Python<'py>,
+        grasps: PyReadonlyArray3<'py, f64>,
+        friction: f64,
+        edges: usize,
+        surfaces: usize,
+        steps: usize,
+        length: f64,
+        difference: Option<f64>,
+    ) -> PyResult<Vec<Transferred<'py>>> {
+        let cone = cone(friction, edges, 0.0)?;
+        let grasps = coordinates(&grasps)?;
+        let schedule = Schedule {
+            surfaces,
+            steps,
+            length,
+            difference,
+        };
+        let carried = py.detach(|| self.0.by_gradient(&grasps, &cone, schedule));
+        transferred(py, carried)
+    }
+
+    /// The ascent by all facets near the origin, for three contacts.
+    fn by_ascent<'py>(
+        &self,
+        py: Python<'py>,
+        grasps: PyReadonlyArray3<'py, f64>,
+        friction: f64,
+        edges: usize,
+    ) -> PyResult<Vec<Transferred<'py>>> {
+        let cone = cone(friction, edges, 0.0)?;
+        let grasps: Vec<_> = coordinates(&grasps)?
+            .iter()
+            .map(|grasp| [grasp[0], grasp[1], grasp[2]])
+            .collect();
+        let carried = py.detach(|| self.0.by_ascent(&grasps, &cone));
+        transferred(py, carried)
+    }
+}
+
+/// Contact coordinates of n grasps.
+fn coordinates(grasps: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Vec<[f64; 2]>>> {
+    let m = grasps.as_array().shape()[1];
+    let pairs: &[[f64; 2]] = grasps.as_slice()?.as_chunks().0;
+    Ok(pairs.chunks_exact(m).map(<[_]>::to_vec).collect())
+}
+
+fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferred<'_>>> {
+    carried
+        .into_iter()
+        .map(|c| Ok((table(py, c.coordinates)?, table(py, c.path)?, c.evaluations)))
+        .collect()
+}
+
 /// The compiled kernels of graspmoduli.
 #[pymodule]
 mod _core {
     #[pymodule_export]
     use super::{
-        GraspModuliError, Surface, best_subsets, circular_quality, combine, extreme_quality,
-        is_clean, quality, quality_at_least, quality_gradient, sample_points, synthesize, weakest,
+        GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,
+        extreme_quality, is_clean, quality, quality_at_least, quality_gradient, sample_points,
+        synthesize, weakest,
     };
 }

@@ -22,6 +22,7 @@
 //! | [`search`] | the best of all subsets of contacts |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
+//! | [`transfer`] | carrying grasps from one surface to another |
 //! | [`error`] | what can be wrong with a request |
 //!
 //! No global state: threads and random numbers are arguments.
@@ -36,3 +37,4 @@ pub mod search;
 mod spline;
 pub mod surface;
 pub mod synthesis;
+pub mod transfer;

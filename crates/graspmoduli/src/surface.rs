@@ -295,16 +295,7 @@ impl Surface {
     /// Σ weight·S in the convex cone of surfaces (Lemma III.1): exact on the coefficients, once
     /// all are written on a common refinement of their grids. Weights are positive.
     pub fn combine(terms: &[(f64, &Surface)]) -> Result<Self, Error> {
-        let common = |count: fn(&Surface) -> usize| {
-            terms
-                .iter()
-                .fold(1, |all, (_, s)| least_common_multiple(all, count(s)))
-        };
-        let intervals = common(|s| s.u_basis.intervals());
-        let columns = common(|s| s.columns);
-        if intervals > LARGEST_GRID || columns > LARGEST_GRID {
-            return Err(Error::GridTooLarge(intervals, columns));
-        }
+        let (intervals, columns) = common_grid(terms.iter().map(|&(_, surface)| surface))?;
         let mut sum = vec![0.0; (intervals + 3) * columns];
         let (mut bottom, mut top) = (0.0, 0.0);
         for &(weight, surface) in terms {
@@ -319,6 +310,26 @@ impl Surface {
             }
         }
         Self::new(bottom, top, columns, sum)
+    }
+
+    /// Both surfaces, unchanged, on a common refinement of their grids.
+    pub(crate) fn on_common_grid(&self, other: &Self) -> Result<(Self, Self), Error> {
+        let (intervals, columns) = common_grid([self, other])?;
+        let on_grid = |s: &Self| Self::new(s.bottom, s.top, columns, s.refined(intervals, columns));
+        Ok((on_grid(self)?, on_grid(other)?))
+    }
+
+    /// (1 − t) S + t S' of surfaces on the same grid, 0 ≤ t ≤ 1.
+    pub(crate) fn towards(&self, other: &Self, t: f64) -> Self {
+        let mix = |a: f64, b: f64| (1.0 - t) * a + t * b;
+        let pairs = self.coefficients.iter().zip(&other.coefficients);
+        Self {
+            bottom: mix(self.bottom, other.bottom),
+            top: mix(self.top, other.top),
+            coefficients: pairs.map(|(&a, &b)| mix(a, b)).collect(),
+            integrals: OnceLock::new(),
+            ..self.clone()
+        }
     }
 
     /// Coefficients on a grid of so many intervals in u and θ, multiples of the present ones.
@@ -416,6 +427,21 @@ pub(crate) fn simpson(steps: usize) -> impl Iterator<Item = f64> {
         i if i % 2 == 1 => 4.0 / 3.0,
         _ => 2.0 / 3.0,
     })
+}
+
+/// Intervals in u and θ of the coarsest grid that refines all surfaces' grids.
+fn common_grid<'a>(
+    surfaces: impl IntoIterator<Item = &'a Surface>,
+) -> Result<(usize, usize), Error> {
+    let (mut intervals, mut columns) = (1, 1);
+    for surface in surfaces {
+        intervals = least_common_multiple(intervals, surface.u_basis.intervals());
+        columns = least_common_multiple(columns, surface.columns);
+    }
+    if intervals > LARGEST_GRID || columns > LARGEST_GRID {
+        return Err(Error::GridTooLarge(intervals, columns));
+    }
+    Ok((intervals, columns))
 }
 
 fn least_common_multiple(a: usize, b: usize) -> usize {

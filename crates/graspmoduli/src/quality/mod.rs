@@ -34,6 +34,7 @@ pub struct Evaluator {
     pub(crate) kernel: Kernel,
     polytope: Polytope,
     wrenches: Wrenches,
+    evaluations: usize,
 }
 
 /// A grasp's quality with the direction in which it is least.
@@ -55,12 +56,19 @@ impl Evaluator {
             kernel: Kernel::new(cone),
             polytope: Polytope::default(),
             wrenches: Wrenches::new(),
+            evaluations: 0,
         }
+    }
+
+    /// How many grasps were evaluated so far, for their value, gradient or facets.
+    pub fn evaluations(&self) -> usize {
+        self.evaluations
     }
 
     /// Exact Q_l; 0 if the origin is not in the interior of the wrench hull.
     #[inline]
     pub fn quality(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
+        self.evaluations += 1;
         match self.closed_form(contacts) {
             Some(three) => self
                 .kernel
@@ -180,6 +188,7 @@ impl Evaluator {
     /// [`Evaluator::gradient`] into memory that is all 0, laid out as [`Gradient::width`] says.
     #[inline]
     fn gradient_row(&mut self, contacts: &[Contact], center: DVec3, row: &mut [f64]) {
+        self.evaluations += 1;
         if let Some(three) = self.closed_form(contacts) {
             if let Some(vertex) = self.kernel.longest(three, center) {
                 row[0] = quality_of(vertex);
@@ -287,6 +296,7 @@ impl Evaluator {
         distance: f64,
         most: usize,
     ) -> Option<Vec<Gradient>> {
+        self.evaluations += 1;
         let cone = &self.cone;
         let vertices = self
             .kernel

@@ -1,0 +1,219 @@
+"""The Grasp Moduli Space: combinations, curves, distances of grasps, transfer."""
+
+import numpy as np
+import pytest
+
+import graspmoduli as gm
+
+MODELS = gm.shapes.MODELS
+TAU = 2 * np.pi
+
+
+@pytest.fixture(scope="module")
+def grasps():
+    """The best of 100 sampled contacts on some models."""
+    found = {}
+    for name in "aefgk":
+        u, theta = gm.sample_points(MODELS[name], 100, seed=0)
+        found[name] = gm.best_grasps(MODELS[name], u, theta)[0].grasp
+    return found
+
+
+class TestCombinations:
+    def test_weights_are_barycentric_and_reproducible(self):
+        weights = gm.sample_weights(4, 5000, seed=3)
+        assert weights.shape == (5000, 4)
+        assert (weights >= 0).all()
+        np.testing.assert_allclose(weights.sum(1), 1.0, atol=1e-12)
+        np.testing.assert_array_equal(weights, gm.sample_weights(4, 5000, seed=3))
+        # Uniform on the simplex: mean 1/4, variance 3/80.
+        np.testing.assert_allclose(weights.mean(0), 0.25, atol=4 * np.sqrt(3 / 80 / 5000))
+        np.testing.assert_allclose(weights.var(0), 3 / 80, rtol=0.15)
+
+    def test_concentration_moves_them_to_the_corners_or_the_middle(self):
+        corners = gm.sample_weights(3, 2000, concentration=0.1).max(1)
+        middle = gm.sample_weights(3, 2000, concentration=20.0).max(1)
+        assert corners.mean() > 0.85
+        assert middle.mean() < 0.45
+        uneven = gm.sample_weights(2, 2000, concentration=[3.0, 1.0]).mean(0)
+        np.testing.assert_allclose(uneven, [0.75, 0.25], atol=0.02)
+
+    def test_surfaces_are_the_combinations(self):
+        corners = [MODELS[name] for name in "aef"]
+        surfaces = gm.sample_combinations(corners, 3, seed=5)
+        for surface, weights in zip(surfaces, gm.sample_weights(3, 3, seed=5), strict=True):
+            wanted = sum(w * s.radius(0.3, 1.0) for w, s in zip(weights, corners, strict=True))
+            assert surface.radius(0.3, 1.0) == pytest.approx(wanted, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"concentration": 0.0}, "concentration must be positive, got 0"),
+            ({"concentration": [1, 2]}, "concentration must be a number or have shape"),
+            ({"n": 0}, "n must be at least 1"),
+        ],
+    )
+    def test_wrong_input(self, options, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.sample_weights(**{"surfaces": 3, "n": 2, **options})
+
+
+class TestCurve:
+    def test_ends_in_both_points_and_is_linear_between(self):
+        start = MODELS["a"], gm.Grasp([0.1, 0.5, 0.9], [0.0, 1.0, 2.0])
+        end = MODELS["f"], gm.Grasp([0.2, 0.5, 0.7], [0.5, 1.0, 1.0])
+        for t, (surface, grasp) in ((0.0, start), (1.0, end)):
+            at, here = gm.interpolate(start, end, t)
+            assert here == grasp
+            assert at.radius(0.4, 2.0) == pytest.approx(surface.radius(0.4, 2.0), abs=1e-12)
+        middle, grasp = gm.interpolate(start, end, 0.25)
+        np.testing.assert_allclose(grasp.u, [0.125, 0.5, 0.85])
+        np.testing.assert_allclose(grasp.theta, [0.125, 1.0, 1.75])
+        wanted = 0.75 * MODELS["a"].radius(0.4, 2.0) + 0.25 * MODELS["f"].radius(0.4, 2.0)
+        assert middle.radius(0.4, 2.0) == pytest.approx(wanted, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        ("start", "end", "middle"),
+        [
+            (0.1, TAU - 0.1, 0.0),
+            (TAU - 0.3, 0.1, TAU - 0.1),
+            (1.0, 4.0, 2.5),
+            # Exactly opposite: straight in [0, 2π), both ways.
+            (0.0, np.pi, np.pi / 2),
+            (np.pi, 0.0, np.pi / 2),
+            (1.0, 1.0 + np.pi, 1.0 + np.pi / 2),
+        ],
+    )
+    def test_angles_take_the_shorter_arc(self, start, end, middle):
+        surface = MODELS["a"]
+        a, b = gm.Grasp([0.5], [start]), gm.Grasp([0.5], [end])
+        found = gm.interpolate((surface, a), (surface, b), 0.5)[1].theta[0]
+        assert np.cos(found - middle) == pytest.approx(1.0, abs=1e-12)
+
+    def test_wrong_input(self):
+        point = MODELS["a"], gm.Grasp([0.5], [0.0])
+        for t in (-0.1, 1.1):
+            with pytest.raises(gm.GraspModuliError, match="t must lie in"):
+                gm.interpolate(point, point, t)
+        two = MODELS["a"], gm.Grasp([0.5, 0.5], [0.0, 1.0])
+        with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 1 and 2"):
+            gm.interpolate(point, two, 0.5)
+
+
+class TestPlacedDistance:
+    def test_is_a_metric(self):
+        rng = np.random.default_rng(71)
+        for _ in range(50):
+            p, q, r = (
+                gm.place(MODELS[name], gm.Grasp(rng.random(3), TAU * rng.random(3)))
+                for name in rng.choice(list(MODELS), 3)
+            )
+            assert gm.placed_distance(p, p) == 0.0
+            assert gm.placed_distance(p, q) == gm.placed_distance(q, p) > 0.0
+            through = gm.placed_distance(p, r) + gm.placed_distance(r, q)
+            assert gm.placed_distance(p, q) <= through + 1e-12
+
+    def test_is_the_largest_of_its_parts(self):
+        p = gm.place(MODELS["a"], gm.Grasp([0.2, 0.8], [0.0, 1.0]))
+        moved = gm.PlacedGrasp(
+            np.add(p.contacts, [[0.3, 0, 0], [0, 0, 0]]), p.normals, p.center_of_mass
+        )
+        assert gm.placed_distance(p, moved) == pytest.approx(0.3)
+        shifted = gm.PlacedGrasp(p.contacts, p.normals, np.add(p.center_of_mass, [0, 0, 0.5]))
+        assert gm.placed_distance(p, shifted) == pytest.approx(0.5)
+        turned = gm.PlacedGrasp(p.contacts, -p.normals, p.center_of_mass)
+        assert gm.placed_distance(p, turned) == pytest.approx(2.0)
+        with pytest.raises(gm.GraspModuliError, match="same number of contacts"):
+            gm.placed_distance(p, gm.place(MODELS["a"], gm.Grasp([0.2], [0.0])))
+
+
+class TestTransfer:
+    def test_naive_keeps_the_coordinates(self, grasps):
+        found = gm.transfer(MODELS["e"], grasps["e"], MODELS["k"])
+        assert found.grasp == grasps["e"]
+        placed = gm.place(MODELS["k"], grasps["e"])
+        assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
+        start = gm.place(MODELS["e"], grasps["e"]).quality()
+        assert found.path[0] == pytest.approx(start, abs=1e-12)
+        assert found.path[-1] == found.quality
+        assert len(found.path) == len(found.t) == 101
+        half = gm.place(gm.combine([MODELS["e"], MODELS["k"]], [0.5, 0.5]), grasps["e"])
+        # The centre of mass on the way is by Simpson's rule.
+        assert found.path[50] == pytest.approx(half.quality(), abs=1e-3)
+
+    @pytest.mark.parametrize("method", ["gradient", "ascent"])
+    def test_quality_is_that_of_the_grasp_and_u_stays_on_the_surface(self, grasps, method):
+        for source in "aefgk":
+            for target in "efg":
+                found = gm.transfer(MODELS[source], grasps[source], MODELS[target], method)
+                placed = gm.place(MODELS[target], found.grasp)
+                assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
+                assert found.status == "force closure"
+                assert (found.grasp.u >= 0).all()
+                assert (found.grasp.u <= 1).all()
+                assert found.t[0] == 0.0
+                assert found.t[-1] == 1.0
+
+    def test_ours_beats_the_papers_in_a_tenth_of_its_evaluations(self, grasps):
+        pairs = [(s, t) for s in "aefgk" for t in "aefgk"]
+        better = 0
+        for source, target in pairs:
+            arguments = MODELS[source], grasps[source], MODELS[target]
+            naive = gm.transfer(*arguments)
+            theirs, ours = (gm.transfer(*arguments, m) for m in ("gradient", "ascent"))
+            assert ours.evaluations <= theirs.evaluations / 10
+            assert ours.quality >= naive.quality
+            better += ours.quality >= theirs.quality
+        assert better >= 0.9 * len(pairs)
+
+    def test_finite_differences_follow_exact_derivatives(self, grasps):
+        arguments = MODELS["f"], grasps["f"], MODELS["k"], "gradient"
+        options = {"surfaces": 20, "steps": 5}
+        exact = gm.transfer(*arguments, **options)
+        finite = gm.transfer(*arguments, difference=1e-6, **options)
+        np.testing.assert_allclose(finite.path, exact.path, atol=2e-3)
+        assert finite.evaluations == 100 * 7 + 21
+        assert exact.evaluations == 100 + 21
+
+    def test_on_one_surface_it_is_an_ascent(self, grasps):
+        start = gm.place(MODELS["g"], grasps["g"]).quality()
+        for method in ("gradient", "ascent"):
+            assert gm.transfer(MODELS["g"], grasps["g"], MODELS["g"], method).quality >= start
+
+    def test_several_at_once_are_as_one_by_one(self, grasps):
+        several = list(grasps.values())
+        for method in ("naive", "gradient", "ascent"):
+            together = gm.transfer(MODELS["a"], several, MODELS["f"], method)
+            for grasp, found in zip(several, together, strict=True):
+                alone = gm.transfer(MODELS["a"], grasp, MODELS["f"], method)
+                assert alone.grasp == found.grasp
+                np.testing.assert_array_equal(alone.path, found.path)
+        assert gm.transfer(MODELS["a"], [], MODELS["f"]) == []
+
+    def test_other_hands(self):
+        surface = MODELS["f"]
+        u, theta = gm.sample_points(surface, 20, seed=2)
+        grasp = gm.best_grasps(surface, u, theta, contacts=4)[0].grasp
+        naive = gm.transfer(surface, grasp, MODELS["k"])
+        moved = gm.transfer(surface, grasp, MODELS["k"], "gradient", surfaces=10, steps=5)
+        assert moved.quality > naive.quality
+        with pytest.raises(gm.GraspModuliError, match="three contacts, got 4"):
+            gm.transfer(surface, grasp, MODELS["k"], "ascent")
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"method": "magic"}, "method must be one of naive, gradient, ascent, got 'magic'"),
+            ({"friction": 0}, "friction must be a positive"),
+            ({"surfaces": 0}, "surfaces must be at least 1"),
+            ({"step_length": -1}, "step_length must be a positive"),
+            ({"difference": 0}, "difference must be a positive"),
+        ],
+    )
+    def test_wrong_input(self, grasps, options, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.transfer(MODELS["a"], grasps["a"], MODELS["f"], **options)
+
+    def test_wrong_grasps(self, grasps):
+        with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 3 and 1"):
+            gm.transfer(MODELS["a"], [grasps["a"], gm.Grasp([0.5], [0.0])], MODELS["f"])
