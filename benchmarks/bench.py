@@ -187,6 +187,34 @@ def synthesis_rows():
     return rows
 
 
+def transfer_rows():
+    """All 144 transfers between the models, from the best of 200 sampled contacts (Sec. IV.D)."""
+    models = gm.shapes.MODELS
+    best = {}
+    for name, surface in models.items():
+        u, theta = gm.sample_points(surface, 200, seed=0)
+        best[name] = gm.best_grasps(surface, u, theta)[0].grasp
+    ends, rows = {}, []
+    for method in ("naive", "gradient", "ascent"):
+        start = time.perf_counter()
+        found = [gm.transfer(models[s], best[s], models[t], method) for s in models for t in models]
+        taken = time.perf_counter() - start
+        ends[method] = np.array([transfer.quality for transfer in found])
+        most = max(transfer.evaluations for transfer in found)
+        rows.append(
+            (
+                method,
+                str((ends[method] > 0).sum()),
+                str((ends[method] > ends["naive"]).sum()),
+                str((ends[method] >= ends["gradient"]).sum()) if method == "ascent" else "",
+                f"{ends[method].mean():.4f}",
+                f"{most:,}",
+                duration(taken / len(found)),
+            )
+        )
+    return rows
+
+
 def duration(s):
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if s >= size:
@@ -241,10 +269,22 @@ def main():
         )  # fmt: skip
         figure.add_row(*row)
         lines.append("| " + " | ".join(row) + " |")
+    transfers = Table(title="Transfers between the twelve models", title_justify="left")
+    titles = (
+        "method", "force closure, of 144", "better than naive", "at least the gradient method",
+        "mean Q_8", "most evaluations", "time each",
+    )  # fmt: skip
+    for title in titles:
+        transfers.add_column(title, justify="right")
+    lines += ["", "| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
+    for row in transfer_rows():
+        transfers.add_row(*row)
+        lines.append("| " + " | ".join(row) + " |")
     console = Console()
     console.print(speed)
     console.print(bound)
     console.print(figure)
+    console.print(transfers)
     if target:
         machine = f"{platform.machine()}, {os.cpu_count()} cores"
         head = f"# Benchmarks\n\nWritten by `make bench` on {machine}. Ratios count, not seconds."

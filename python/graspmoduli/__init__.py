@@ -8,6 +8,7 @@ surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 the moduli space       :func:`interpolate`, :func:`placed_distance`, :func:`transfer`,
                        :func:`sample_combinations`
+guarantees             :func:`certified_radius`, :func:`certify_transfer`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
 errors                 :class:`GraspModuliError`
@@ -30,6 +31,9 @@ from .grasps import PlacedGrasp as PlacedGrasp
 from .grasps import RankedGrasp as RankedGrasp
 from .grasps import grasp_gradient as grasp_gradient
 from .grasps import place as place
+from .guarantees import Certificate as Certificate
+from .guarantees import certified_radius as certified_radius
+from .guarantees import certify_transfer as certify_transfer
 from .moduli import Transfer as Transfer
 from .moduli import interpolate as interpolate
 from .moduli import placed_distance as placed_distance

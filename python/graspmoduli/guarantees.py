@@ -1,0 +1,99 @@
+"""What is proven of grasps nearby: certified radii (derived in docs/mathematics.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._arrays import cone
+from .grasps import Grasp, PlacedGrasp, place
+from .quality import circular_quality
+from .surfaces import Surface
+
+#: How far the bounds of the circular quality are driven together, relative to the upper one.
+TOLERANCE = 1e-2
+#: Units of length tried for torques, in lever arms.
+UNITS = (0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int = 8) -> float:
+    """A ρ such that every configuration within ρ of this one is force closure, proven.
+
+    "Within" is by the metric d of Sec. III on contacts, normals and centre of mass; the last does
+    not matter for force closure, so it may move any distance. The proof is for the polygonal cones
+    as they are, wherever R(n) lays their edges out: it goes through the circular cones inscribed
+    in them. The largest such ρ is larger.
+
+    Parameters
+    ----------
+    placed
+        The grasp, any number of contacts.
+    friction, edges
+        As in :func:`graspmoduli.quality`, positive.
+
+    Returns
+    -------
+    float
+        0 if the grasp is not force closure even with the inscribed cones.
+    """
+    mu, l = cone(friction, edges)
+    inscribed = mu * np.cos(np.pi / l)
+    center = placed.contacts.mean(0)
+    reach = float(np.linalg.norm(placed.contacts - center, axis=1).max())
+    best = 0.0
+    for unit in UNITS:
+        length = unit * reach
+        if not length > 0.0:
+            break
+        bounds = circular_quality(
+            placed.contacts / length,
+            placed.normals,
+            center / length,
+            friction=inscribed,
+            tolerance=TOLERANCE,
+        )
+        # Forces move by ‖f‖ρ, torques about the centre by ‖f‖(1 + ‖r‖)ρ.
+        speed = np.hypot(1.0, inscribed) * np.hypot(1.0, (1.0 + reach) / length)
+        best = max(best, float(bounds.lower / speed))
+    # Rounding, in the bounds and in the division.
+    return best * (1.0 - 1e-9)
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Whether a naïve transfer is proven to keep a grasp force closure."""
+
+    #: The certified radius of the grasp on its own surface.
+    radius: float
+    #: The largest distance by which a contact or normal moves.
+    distance: float
+
+    @property
+    def certified(self) -> bool:
+        """Force closure on the target is proven."""
+        return self.distance <= self.radius
+
+
+def certify_transfer(
+    source: Surface, grasp: Grasp, target: Surface, *, friction: float = 1.0, edges: int = 8
+) -> Certificate:
+    """Is the naïve transfer of a grasp proven to be force closure? (Sec. III, Lemma III.5)
+
+    By the lemma contacts and normals move no further than d(S, T); here by how far they do. Not
+    certified does not mean lost.
+
+    Parameters
+    ----------
+    source, grasp, target
+        The surface S, a grasp on it, the surface T.
+    friction, edges
+        As in :func:`graspmoduli.quality`, positive.
+    """
+    p, q = place(source, grasp), place(target, grasp)
+    moved = [
+        np.linalg.norm(p.contacts - q.contacts, axis=1).max(),
+        np.linalg.norm(p.normals - q.normals, axis=1).max(),
+    ]
+    radius = certified_radius(p, friction=friction, edges=edges)
+    return Certificate(radius, float(max(moved)))

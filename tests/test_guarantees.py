@@ -1,0 +1,91 @@
+"""Certified radii are never contradicted."""
+
+import numpy as np
+import pytest
+
+import graspmoduli as gm
+from conftest import uniform_grasps
+
+MODELS = gm.shapes.MODELS
+
+
+def sphere(rng, shape):
+    v = rng.normal(size=(*shape, 3))
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def tilt(normals, axes, chord):
+    """Unit normals at a chord's length from the given ones."""
+    across = axes - (axes * normals).sum(-1, keepdims=True) * normals
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    angle = 2 * np.arcsin(chord / 2)
+    return np.cos(angle) * normals + np.sin(angle) * across
+
+
+@pytest.mark.parametrize("m", [3, 4])
+@pytest.mark.parametrize(("friction", "edges"), [(1.0, 8), (0.5, 5)])
+def test_no_grasp_within_the_radius_is_lost(m, friction, edges):
+    rng = np.random.default_rng(81)
+    options = {"friction": friction, "edges": edges}
+    grasps = uniform_grasps(600, rng, m)
+    q = gm.quality(*grasps, **options)
+    certified = 0
+    for contacts, normals, center in zip(*(a[q > 0.03][:6] for a in grasps), strict=True):
+        placed = gm.PlacedGrasp(contacts, normals, center)
+        radius = gm.certified_radius(placed, **options)
+        if radius == 0.0:
+            continue
+        certified += 1
+        n = 2500
+        # On the boundary of the ball: at random, and against the gradient.
+        moves = sphere(rng, (n, m))
+        axes = sphere(rng, (n, m))
+        slope = gm.quality_gradient(contacts, normals, center, **options)
+        lengths = np.linalg.norm(slope.contacts, axis=1, keepdims=True)
+        moves[::2] = -slope.contacts / np.maximum(lengths, 1e-9) + 0.3 * moves[::2]
+        moves /= np.linalg.norm(moves, axis=-1, keepdims=True)
+        axes[::2] = -slope.normals + 0.1 * axes[::2]
+        moved = contacts + radius * moves
+        tilted = tilt(np.broadcast_to(normals, axes.shape), axes, radius)
+        assert gm.quality(moved, tilted, center, **options).min() > 0.0
+    assert certified > 0
+
+
+def test_the_centre_of_mass_and_the_frame_of_a_normal_do_not_matter():
+    # A normal at −e₃, where the contact frame is not continuous.
+    contacts = np.array([[0, 0, 1.0], [0.5, 0, -1], [-0.5, 0.1, -1]])
+    normals = np.array([[0, 0, -1.0], [0, 0, 1], [0, 0, 1]])
+    radius = gm.certified_radius(gm.PlacedGrasp(contacts, normals, np.zeros(3)))
+    assert radius > 0.01
+    far = gm.certified_radius(gm.PlacedGrasp(contacts, normals, np.array([5.0, 0, 0])))
+    assert far == radius
+    rng = np.random.default_rng(82)
+    tilted = tilt(np.broadcast_to(normals, (5000, 3, 3)), sphere(rng, (5000, 3)), radius)
+    assert gm.quality(np.broadcast_to(contacts, (5000, 3, 3)), tilted, np.zeros(3)).min() > 0.0
+
+
+def test_what_is_not_force_closure_has_no_radius():
+    pair = gm.PlacedGrasp(
+        np.array([[1.0, 0, 0], [-1, 0, 0]]), np.array([[-1.0, 0, 0], [1, 0, 0]]), np.zeros(3)
+    )
+    assert gm.certified_radius(pair) == 0.0
+    same = gm.PlacedGrasp(np.ones((3, 3)), np.eye(3), np.zeros(3))
+    assert gm.certified_radius(same) == 0.0
+    with pytest.raises(gm.GraspModuliError, match="friction must be a positive"):
+        gm.certified_radius(pair, friction=0.0)
+
+
+def test_certified_transfers_hold():
+    source = MODELS["f"]
+    u, theta = gm.sample_points(source, 60, seed=3)
+    grasp = gm.best_grasps(source, u, theta)[0].grasp
+    certified = []
+    for share in (1e-3, 0.01, 0.03, 0.1, 1.0):
+        for name in "ekl":
+            target = gm.combine([source, MODELS[name]], [1 - share, share])
+            found = gm.certify_transfer(source, grasp, target)
+            certified.append(found.certified)
+            if found.certified:
+                assert gm.transfer(source, grasp, target).quality > 0.0
+    assert any(certified)
+    assert not all(certified)
