@@ -127,6 +127,90 @@ class TestPlacedDistance:
             gm.placed_distance(p, gm.place(MODELS["a"], gm.Grasp([0.2], [0.0])))
 
 
+class TestSurfaceDistance:
+    def test_no_point_of_a_grid_is_further_apart(self):
+        u, theta = np.meshgrid(np.linspace(0, 1, 301), np.linspace(0, TAU, 401), indexing="ij")
+        for s, t in ("ab", "cf", "eg", "kl"):
+            first, second = MODELS[s], MODELS[t]
+            found = gm.surface_distance(first, second)
+            assert found.error <= 1e-6 * found
+            apart = np.maximum(
+                np.linalg.norm(first.points(u, theta) - second.points(u, theta), axis=-1),
+                np.linalg.norm(first.normals(u, theta) - second.normals(u, theta), axis=-1),
+            )
+            assert apart.max() <= found + found.error + 1e-12
+            assert apart.max() >= 0.99 * found
+            at = found.u, found.theta
+            attained = max(
+                np.linalg.norm(first.points(*at) - second.points(*at)),
+                np.linalg.norm(first.normals(*at) - second.normals(*at)),
+            )
+            assert attained == pytest.approx(float(found), rel=1e-9)
+
+    def test_is_a_metric(self):
+        corners = [MODELS[name] for name in "bfhj"]
+        surfaces = gm.sample_combinations(corners, 6, seed=7)
+        for s in surfaces[:3]:
+            assert gm.surface_distance(s, s) == 0.0
+            for t in surfaces[3:]:
+                there, back = gm.surface_distance(s, t), gm.surface_distance(t, s)
+                assert there == pytest.approx(back, rel=2e-6)
+                assert there > 0.0
+                for r in surfaces[1:3]:
+                    through = gm.surface_distance(s, r) + gm.surface_distance(r, t)
+                    assert there <= through * (1 + 4e-6)
+
+    def test_naive_transfers_move_contacts_and_normals_no_further(self):
+        # Lemma III.5.
+        rng = np.random.default_rng(91)
+        surfaces = gm.sample_combinations([MODELS[name] for name in "aehl"], 8, seed=9)
+        for s, t in zip(surfaces[:4], surfaces[4:], strict=True):
+            limit = gm.surface_distance(s, t)
+            grasp = gm.Grasp(rng.random(300), TAU * rng.random(300))
+            p, q = gm.place(s, grasp), gm.place(t, grasp)
+            reached = gm.placed_distance(p, gm.PlacedGrasp(q.contacts, q.normals, p.center_of_mass))
+            assert reached <= limit + limit.error + 1e-12
+
+    def test_a_moved_or_scaled_surface(self):
+        surface = MODELS["f"]
+        lifted = gm.Surface.from_coefficients(
+            surface.coefficients, surface.bottom + 0.1, surface.top + 0.1
+        )
+        assert gm.surface_distance(surface, lifted) == pytest.approx(0.1)
+        # Scaling leaves normals as they are.
+        u, theta = np.meshgrid(np.linspace(0, 1, 400), np.linspace(0, TAU, 400), indexing="ij")
+        furthest = np.linalg.norm(surface.points(u, theta), axis=-1).max()
+        grown = gm.surface_distance(surface, 1.001 * surface)
+        assert grown == pytest.approx(1e-3 * furthest, rel=1e-4)
+
+    def test_wrong_input(self):
+        with pytest.raises(gm.GraspModuliError, match="tolerance must lie in"):
+            gm.surface_distance(MODELS["a"], MODELS["b"], tolerance=0.0)
+
+
+class TestDistance:
+    def test_is_a_metric_on_pairs(self):
+        rng = np.random.default_rng(92)
+        surfaces = gm.sample_combinations([MODELS[name] for name in "bfh"], 3, seed=4)
+        points = [(s, gm.Grasp(rng.random(2), TAU * rng.random(2))) for s in surfaces]
+        p, q, r = points
+        for angles in ("chord", "arc"):
+            there = gm.distance(p, q, angles=angles)
+            assert there == pytest.approx(gm.distance(q, p, angles=angles), rel=1e-5)
+            assert gm.distance(p, p, angles=angles) == 0.0
+            through = gm.distance(p, r, angles=angles) + gm.distance(r, q, angles=angles)
+            assert there <= through + 1e-5
+
+    def test_counts_heights_and_angles(self):
+        surface = MODELS["a"]
+        p = surface, gm.Grasp([0.2, 0.5], [0.1, 1.0])
+        q = surface, gm.Grasp([0.5, 0.5], [TAU - 0.1, 1.0])
+        assert gm.distance(p, q, angles="arc") == pytest.approx(0.3 + 0.2)
+        assert gm.distance(p, q) == pytest.approx(0.3 + 2 * np.sin(0.1))
+        with pytest.raises(gm.GraspModuliError, match='angles must be "chord" or "arc"'):
+            gm.distance(p, q, angles="degrees")
+
+
 class TestTransfer:
     def test_naive_keeps_the_coordinates(self, grasps):
         found = gm.transfer(MODELS["e"], grasps["e"], MODELS["k"])

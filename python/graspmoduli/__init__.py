@@ -6,8 +6,8 @@ many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
-the moduli space       :func:`interpolate`, :func:`placed_distance`, :func:`transfer`,
-                       :func:`sample_combinations`
+the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:`distance`,
+                       :func:`interpolate`, :func:`transfer`, :func:`sample_combinations`
 guarantees             :func:`certified_radius`, :func:`certify_transfer`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
@@ -34,11 +34,14 @@ from .grasps import place as place
 from .guarantees import Certificate as Certificate
 from .guarantees import certified_radius as certified_radius
 from .guarantees import certify_transfer as certify_transfer
+from .moduli import SurfaceDistance as SurfaceDistance
 from .moduli import Transfer as Transfer
+from .moduli import distance as distance
 from .moduli import interpolate as interpolate
 from .moduli import placed_distance as placed_distance
 from .moduli import sample_combinations as sample_combinations
 from .moduli import sample_weights as sample_weights
+from .moduli import surface_distance as surface_distance
 from .moduli import transfer as transfer
 from .quality import Bounds as Bounds
 from .quality import Extreme as Extreme

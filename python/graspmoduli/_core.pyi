@@ -102,6 +102,9 @@ def synthesize(
     square: Floats,
     allowed: NDArray[np.bool_] | None,
 ) -> Floats: ...
+def surface_distance(
+    first: Surface, second: Surface, tolerance: float
+) -> tuple[float, float, list[float]]: ...
 
 Transferred = tuple[Floats, Floats, int]
 

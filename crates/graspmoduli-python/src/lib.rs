@@ -3,6 +3,7 @@
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
+use graspmoduli::distance;
 use graspmoduli::error::Error;
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use graspmoduli::search;
@@ -421,6 +422,21 @@ fn synthesize<'py>(
     table(py, rows.collect())
 }
 
+/// d(S, S') to a relative error: value, its error bound, and where it is attained.
+#[pyfunction]
+fn surface_distance(
+    py: Python<'_>,
+    first: Py<Surface>,
+    second: Py<Surface>,
+    tolerance: f64,
+) -> PyResult<(f64, f64, [f64; 2])> {
+    let (first, second) = (&first.get().0, &second.get().0);
+    let found = py
+        .detach(|| distance::surface_distance(first, second, tolerance))
+        .map_err(raise)?;
+    Ok((found.value, found.error, found.at))
+}
+
 /// A grasp carried to another surface: coordinates (m, 2), path (k, 2) of t and Q_l, evaluations.
 type Transferred<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, usize);
 
@@ -516,6 +532,6 @@ mod _core {
     use super::{
         GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,
         extreme_quality, is_clean, quality, quality_at_least, quality_gradient, sample_points,
-        synthesize, weakest,
+        surface_distance, synthesize, weakest,
     };
 }

@@ -22,6 +22,7 @@
 //! | [`search`] | the best of all subsets of contacts |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
+//! | [`distance`] | the distance between two surfaces, with a proven error bound |
 //! | [`transfer`] | carrying grasps from one surface to another |
 //! | [`error`] | what can be wrong with a request |
 //!
@@ -29,6 +30,7 @@
 
 pub mod ascent;
 pub mod contact;
+pub mod distance;
 pub mod error;
 mod nnls;
 pub mod quality;

@@ -38,6 +38,19 @@ impl Basis {
         self.intervals
     }
 
+    /// Bernstein coefficients of the four functions that do not vanish on an interval.
+    pub fn bezier(&self, interval: usize) -> [[f64; 4]; 4] {
+        let basis = &self.polynomials[if self.periodic { 0 } else { interval }];
+        basis.map(|[c0, c1, c2, c3]| {
+            [
+                c0,
+                c0 + c1 / 3.0,
+                c0 + (2.0 * c1 + c2) / 3.0,
+                c0 + c1 + c2 + c3,
+            ]
+        })
+    }
+
     /// The four functions that do not vanish at `t`: in [0, 1], or any real if periodic.
     #[inline]
     pub fn at(&self, t: f64) -> Local {

@@ -332,6 +332,33 @@ impl Surface {
         }
     }
 
+    /// Bézier control points of the radius on every patch, rows along u; patch after patch, those of
+    /// an interval in u together.
+    pub(crate) fn bezier_nets(&self) -> Vec<[[f64; 4]; 4]> {
+        let intervals = self.u_basis.intervals();
+        let along_theta = self.theta_basis.bezier(0);
+        let mut nets = Vec::with_capacity(intervals * self.columns);
+        for i in 0..intervals {
+            let along_u = self.u_basis.bezier(i);
+            for j in 0..self.columns {
+                let mut net = [[0.0; 4]; 4];
+                for k in 0..4 {
+                    let row = &self.coefficients[(i + k) * self.columns..][..self.columns];
+                    for l in 0..4 {
+                        let coefficient = row[(j + l) % self.columns];
+                        for a in 0..4 {
+                            for b in 0..4 {
+                                net[a][b] += along_u[k][a] * along_theta[l][b] * coefficient;
+                            }
+                        }
+                    }
+                }
+                nets.push(net);
+            }
+        }
+        nets
+    }
+
     /// Coefficients on a grid of so many intervals in u and θ, multiples of the present ones.
     fn refined(&self, intervals: usize, columns: usize) -> Vec<f64> {
         let mut rows: Vec<Vec<f64>> = self
