@@ -234,6 +234,71 @@ class TestModels:
             _ = gm.shapes.MODELS["z"]
 
 
+class TestCoordinates:
+    @pytest.mark.parametrize("name", ["a", "e", "g", "l"])
+    def test_points_near_the_surface_are_found_again(self, name):
+        surface = gm.shapes.MODELS[name]
+        rng = np.random.default_rng(71)
+        u, theta = rng.uniform(0.05, 0.95, 300), TAU * rng.random(300)
+        offset = rng.uniform(-1e-3, 1e-3, 300)
+        points = surface.points(u, theta) + offset[:, None] * surface.normals(u, theta)
+        found_u, found_theta, distance = surface.coordinates(points)
+        np.testing.assert_allclose(
+            surface.points(found_u, found_theta), surface.points(u, theta), atol=1e-7
+        )
+        np.testing.assert_allclose(distance, np.abs(offset), atol=1e-7)
+
+    def test_nothing_on_a_fine_grid_is_nearer(self):
+        surface = gm.shapes.MODELS["g"]
+        rng = np.random.default_rng(72)
+        points = rng.uniform(-1.2, 1.2, (40, 3))
+        u, theta, distance = surface.coordinates(points)
+        assert ((u >= 0) & (u <= 1) & (theta >= 0) & (theta < TAU)).all()
+        away = np.linalg.norm(surface.points(u, theta) - points, axis=-1)
+        np.testing.assert_allclose(away, distance, atol=1e-12)
+        grid = np.meshgrid(np.linspace(0, 1, 300), np.linspace(0, TAU, 400), indexing="ij")
+        fine = surface.points(*grid).reshape(-1, 3)
+        for point, found in zip(points, distance, strict=True):
+            assert np.linalg.norm(fine - point, axis=1).min() >= found - 1e-9
+
+    def test_shapes_and_wrong_input(self):
+        surface = gm.shapes.MODELS["a"]
+        u, theta, distance = surface.coordinates([[[1.0, 0, 0]]])
+        assert u.shape == theta.shape == distance.shape == (1, 1)
+        with pytest.raises(gm.GraspModuliError, match="points must have shape"):
+            surface.coordinates([1.0, 2.0])
+
+
+class TestClosestCombination:
+    def test_a_combination_is_found_again(self):
+        corners = [gm.shapes.MODELS[name] for name in "aefk"]
+        for weights in gm.sample_weights(4, 5, seed=2, concentration=0.5):
+            surface = gm.combine(corners, weights)
+            np.testing.assert_allclose(gm.closest_combination(surface, corners), weights, atol=1e-7)
+
+    def test_nothing_else_is_closer(self):
+        corners = [gm.shapes.MODELS[name] for name in "bdh"]
+        surface = gm.shapes.MODELS["j"]
+        found = gm.closest_combination(surface, corners)
+        assert found.sum() == pytest.approx(1.0)
+        assert (found >= 0).all()
+        u, theta = np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, TAU, 101)[:-1])
+
+        def apart(weights):
+            combined = gm.combine(corners, weights)
+            off = combined.points(u, theta) - surface.points(u, theta)
+            return (off**2).sum(-1).mean()
+
+        best = apart(found)
+        for other in gm.sample_weights(3, 40, seed=1):
+            mixed = 0.9 * found + 0.1 * other
+            assert apart(mixed / mixed.sum()) >= best * (1 - 1e-3)
+
+    def test_needs_surfaces(self):
+        with pytest.raises(gm.GraspModuliError, match="at least one surface"):
+            gm.closest_combination(gm.shapes.MODELS["a"], [])
+
+
 class TestGraspGradient:
     @pytest.mark.parametrize("m", [3, 4])
     @pytest.mark.parametrize("name", ["b", "f", "k"])

@@ -7,7 +7,8 @@ one grasp              :class:`WrenchSpace`: status, weakest direction, forces a
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:`distance`,
-                       :func:`interpolate`, :func:`transfer`, :func:`sample_combinations`
+                       :func:`interpolate`, :func:`transfer`, :func:`sample_combinations`,
+                       :func:`closest_combination`
 guarantees             :func:`certified_radius`, :func:`certify_transfer`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
@@ -54,6 +55,7 @@ from .quality import quality_gradient as quality_gradient
 from .quality import smallest_quality as smallest_quality
 from .sampling import sample_points as sample_points
 from .surfaces import Surface as Surface
+from .surfaces import closest_combination as closest_combination
 from .surfaces import combine as combine
 from .surfaces import project as project
 from .synthesis import best_grasps as best_grasps

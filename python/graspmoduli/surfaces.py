@@ -193,6 +193,73 @@ class Surface:
         us, thetas, shape = coordinates(u, theta)
         return self._core.place(us, thetas).reshape((*shape, 9, 3))
 
+    def coordinates(self, points: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """The nearest contact coordinates to points in space.
+
+        From the nearest point of a grid of 64 by 128 by Newton's method on the surface, u kept in
+        [0, 1]; to rounding where the nearest point is unique and the grid finds its valley.
+
+        Parameters
+        ----------
+        points
+            Shape (..., 3).
+
+        Returns
+        -------
+        u, theta, distance
+            Each of shape (...): (u, θ) of the nearest point of the surface, and how far it is.
+        """
+        from scipy.spatial import KDTree
+
+        targets = floats("points", points)
+        if targets.ndim < 1 or targets.shape[-1] != 3:
+            raise GraspModuliError(f"points must have shape (..., 3), got {targets.shape}")
+        flat = targets.reshape(-1, 3)
+        grid_u, grid_theta = (
+            a.ravel()
+            for a in np.meshgrid(
+                np.linspace(0.0, 1.0, 64), 2 * np.pi * np.arange(128) / 128, indexing="ij"
+            )
+        )
+        nearest = KDTree(self.points(grid_u, grid_theta)).query(flat)[1]
+        u, theta = grid_u[nearest], grid_theta[nearest]
+        off = self.points(u, theta) - flat
+        for _ in range(50):
+            t1, t2 = self.tangents(u, theta)
+            bend = self.second_derivatives(u, theta)
+            slope = np.stack([(off * t1).sum(-1), (off * t2).sum(-1)], axis=-1)
+            # At an end of the surface u does not go further.
+            held = ((u <= 0.0) & (slope[:, 0] > 0.0)) | ((u >= 1.0) & (slope[:, 0] < 0.0))
+            uu = (t1 * t1).sum(-1) + np.maximum((off * bend.uu).sum(-1), 0.0)
+            ut = (t1 * t2).sum(-1) + (off * bend.u_theta).sum(-1)
+            tt = (t2 * t2).sum(-1) + np.maximum((off * bend.theta_theta).sum(-1), 0.0)
+            determinant = uu * tt - ut * ut
+            plain = (determinant <= 1e-3 * uu * tt) | held
+            ut, determinant = np.where(plain, 0.0, ut), np.where(plain, uu * tt, determinant)
+            du = np.where(held, 0.0, (ut * slope[:, 1] - tt * slope[:, 0]) / determinant)
+            dtheta = (ut * slope[:, 0] - uu * slope[:, 1]) / determinant
+            share = np.ones(len(flat))
+            square = (off * off).sum(-1)
+            next_u, next_theta, next_off = u, theta, off
+            worse = np.zeros(len(flat), dtype=bool)
+            for _ in range(30):
+                next_u = np.clip(u + share * du, 0.0, 1.0)
+                next_theta = theta + share * dtheta
+                next_off = self.points(next_u, next_theta) - flat
+                worse = (next_off * next_off).sum(-1) > square
+                if not worse.any():
+                    break
+                share = np.where(worse, 0.5 * share, share)
+            better = ~worse
+            moved = np.abs(next_u - u) + np.abs(next_theta - theta)
+            u, theta = np.where(better, next_u, u), np.where(better, next_theta, theta)
+            off = np.where(better[:, None], next_off, off)
+            if not (better & (moved > 1e-14)).any():
+                break
+        shape = targets.shape[:-1]
+        distance = np.linalg.norm(off, axis=-1)
+        return u.reshape(shape), (theta % (2 * np.pi)).reshape(shape), distance.reshape(shape)
+
     # Integrals ----------------------------------------------------------------------------
 
     @property
@@ -283,6 +350,33 @@ def combine(surfaces: Sequence[Surface], weights: ArrayLike) -> Surface:
         raise GraspModuliError(f"weights must sum to 1, got {values.sum()}")
     terms = [(w, s) for w, s in zip(values.tolist(), surfaces, strict=True) if w > 0.0]
     return Surface(_core.combine([w for w, _ in terms], [s._core for _, s in terms]))
+
+
+def closest_combination(surface: Surface, surfaces: Sequence[Surface]) -> Floats:
+    """Barycentric coordinates of the surface of Conv(X) closest to a given one (Sec. III).
+
+    Closest in the mean of ‖c_S(u, θ) − c_{S'}(u, θ)‖² over u and θ: a convex problem with one
+    answer if the given ones are independent. Shape (n,), not negative, summing to 1.
+    """
+    from scipy.optimize import nnls
+
+    if not len(surfaces):
+        raise GraspModuliError("surfaces must hold at least one surface, got none")
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    u, theta = np.meshgrid(0.5 * (nodes + 1.0), 2 * np.pi * np.arange(96) / 96, indexing="ij")
+    root = np.sqrt(np.repeat(0.5 * weights, 96) / 96)
+
+    def vector(s: Surface) -> Floats:
+        heights = (1.0 - u) * s.bottom + u * s.top
+        return np.concatenate([root * s.radius(u, theta).ravel(), root * heights.ravel()])
+
+    offsets = np.stack([vector(s) for s in surfaces], axis=1) - vector(surface)[:, None]
+    # The point of a convex hull nearest to the origin, as a non-negative least-squares problem:
+    # the sum of the weights is asked for at a price, and divided out.
+    price = max(float(np.linalg.norm(offsets, axis=0).max()), 1e-300)
+    system = np.vstack([offsets / price, np.ones(len(surfaces))])
+    found, _ = nnls(system, np.append(np.zeros(len(offsets)), 1.0))
+    return found / found.sum()
 
 
 def project(surface: Surface) -> Surface:

@@ -7,8 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, QhullError
 
 from . import _core
 from ._arrays import Floats, coefficient, count, floats, grasps, locked
@@ -113,6 +111,8 @@ class WrenchSpace:
         """
         if self.quality > 0.0:
             return "force closure"
+        from scipy.optimize import linprog
+
         scaled, _ = self._scaled()
         # The least ‖Σ α w‖_∞ over the hull.
         count = len(scaled)
@@ -168,6 +168,8 @@ class WrenchSpace:
         Resistance
             The forces with the least sum of normal forces, by linear programming.
         """
+        from scipy.optimize import linprog
+
         load = floats("wrench", wrench)
         if load.shape != (6,):
             raise GraspModuliError(f"wrench must have shape (6,), got {load.shape}")
@@ -195,6 +197,8 @@ class WrenchSpace:
     @cached_property
     def volume(self) -> float:
         """Volume of S in R⁶, by Qhull; 0 if it is flat. For comparison with other tools."""
+        from scipy.spatial import ConvexHull, QhullError
+
         try:
             scaled, length = self._scaled()
             return float(ConvexHull(scaled, qhull_options="QJ").volume * length**3)
