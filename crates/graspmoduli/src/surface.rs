@@ -332,31 +332,31 @@ impl Surface {
         }
     }
 
-    /// Bézier control points of the radius on every patch, rows along u; patch after patch, those of
-    /// an interval in u together.
-    pub(crate) fn bezier_nets(&self) -> Vec<[[f64; 4]; 4]> {
-        let intervals = self.u_basis.intervals();
+    /// Bézier control points of the radius on the patch of an interval in u and a column: rows along u.
+    pub(crate) fn bezier_net(&self, interval: usize, column: usize) -> [[f64; 4]; 4] {
+        let along_u = self.u_basis.bezier(interval);
         let along_theta = self.theta_basis.bezier(0);
-        let mut nets = Vec::with_capacity(intervals * self.columns);
-        for i in 0..intervals {
-            let along_u = self.u_basis.bezier(i);
-            for j in 0..self.columns {
-                let mut net = [[0.0; 4]; 4];
-                for k in 0..4 {
-                    let row = &self.coefficients[(i + k) * self.columns..][..self.columns];
-                    for l in 0..4 {
-                        let coefficient = row[(j + l) % self.columns];
-                        for a in 0..4 {
-                            for b in 0..4 {
-                                net[a][b] += along_u[k][a] * along_theta[l][b] * coefficient;
-                            }
-                        }
+        let mut net = [[0.0; 4]; 4];
+        for k in 0..4 {
+            let row = &self.coefficients[(interval + k) * self.columns..][..self.columns];
+            for l in 0..4 {
+                let coefficient = row[(column + l) % self.columns];
+                for a in 0..4 {
+                    for b in 0..4 {
+                        net[a][b] += along_u[k][a] * along_theta[l][b] * coefficient;
                     }
                 }
-                nets.push(net);
             }
         }
-        nets
+        net
+    }
+
+    /// The same surface on the smallest periodic grid, if to rounding it is one of revolution.
+    pub(crate) fn of_revolution(&self) -> Option<Self> {
+        let largest = self.coefficients.iter().fold(0.0, |m: f64, &c| m.max(c));
+        let even = |row: &[f64]| row.iter().all(|c| (c - row[0]).abs() <= 1e-14 * largest);
+        let mut rows = self.coefficients.chunks_exact(self.columns);
+        rows.all(even).then(|| self.project())
     }
 
     /// Coefficients on a grid of so many intervals in u and θ, multiples of the present ones.

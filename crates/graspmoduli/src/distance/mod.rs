@@ -12,16 +12,20 @@
 use crate::error::Error;
 use crate::surface::{Radius, Surface};
 use glam::{DVec2, DVec3};
+use net::{Net, Range, Ranges, ranges_on, ranges_on_patches};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 use std::ops::{Add, Mul};
 
+mod net;
+
 /// Cells looked at before the search ends with the bound that it has.
 const MOST_CELLS: usize = 1 << 20;
 
-/// Halvings of a patch down to which second derivatives are bounded anew.
-const DEEPEST: u32 = 14;
+/// Halvings of a patch down to which second derivatives are bounded anew, at first every time, then
+/// now and then: what a cell inherits holds for it too.
+const DEEPEST: u32 = 12;
 
 /// A distance between surfaces: d(S, S') lies in [`value`, `value` + `error`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,48 +38,48 @@ pub struct SurfaceDistance {
     pub at: [f64; 2],
 }
 
+impl SurfaceDistance {
+    fn improve(&mut self, value: f64, at: DVec2) {
+        if value > self.value {
+            self.value = value;
+            self.at = [at.x.clamp(0.0, 1.0), at.y.rem_euclid(TAU)];
+        }
+    }
+}
+
 /// d(S, S') to a relative error of `tolerance`.
 pub fn surface_distance(
     first: &Surface,
     second: &Surface,
     tolerance: f64,
 ) -> Result<SurfaceDistance, Error> {
-    let (first, second) = first.on_common_grid(second)?;
+    let (first, second) = match (first.of_revolution(), second.of_revolution()) {
+        (Some(first), Some(second)) => first.on_common_grid(&second)?,
+        _ => first.on_common_grid(second)?,
+    };
     let pair = Pair::new(&first, &second);
     let mut best = SurfaceDistance {
         value: 0.0,
         error: 0.0,
         at: [0.0; 2],
     };
-    let mut cells = pair.patches();
-    let mut queue: BinaryHeap<Entry> = (0..cells.len())
-        .map(|index| Entry {
-            bound: pair.rough_bound(&cells[index]),
-            index,
-            split: None,
-        })
-        .collect();
-    while let Some(Entry {
-        bound,
-        index,
-        split,
-    }) = queue.pop()
-    {
+    let mut cells: Vec<Cell> = Vec::new();
+    let mut queue = BinaryHeap::from(pair.patches());
+    while let Some(Entry { bound, part }) = queue.pop() {
         best.error = (bound - best.value).max(0.0);
         if best.error <= tolerance * best.value || cells.len() > MOST_CELLS {
             return Ok(best);
         }
-        if let Some(along_u) = split {
-            for mut half in cells[index].halves(along_u) {
-                if let Some(entry) = pair.examine(&mut half, cells.len(), &mut best) {
-                    cells.push(half);
-                    queue.push(entry);
-                }
+        let parts = match part {
+            Part::Patch(patch, of) => [Some(pair.cell(patch, of)), None],
+            Part::Cell(index, along_u) => cells[index].halves(along_u).map(Some),
+        };
+        for mut cell in parts.into_iter().flatten() {
+            if let Some((bound, along_u)) = pair.examine(&mut cell, &mut best) {
+                let part = Part::Cell(cells.len(), along_u);
+                cells.push(cell);
+                queue.push(Entry { bound, part });
             }
-        } else {
-            let mut cell = cells[index];
-            queue.extend(pair.examine(&mut cell, index, &mut best));
-            cells[index] = cell;
         }
     }
     // Every cell was shown to have its largest distance in another one: only rounding is left.
@@ -83,12 +87,19 @@ pub fn surface_distance(
     Ok(best)
 }
 
-/// A cell by its bound, and the direction in which to halve it; `None` if the bound is rough.
+/// A part of the surfaces and a bound of the distance on it.
 #[derive(Debug, Clone, Copy)]
 struct Entry {
     bound: f64,
-    index: usize,
-    split: Option<bool>,
+    part: Part,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    /// A patch of the splines that was not looked at closely yet.
+    Patch(usize, Distance),
+    /// A cell, and whether to halve it along u.
+    Cell(usize, bool),
 }
 
 impl PartialEq for Entry {
@@ -107,14 +118,9 @@ impl PartialOrd for Entry {
 
 impl Ord for Entry {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.bound
-            .total_cmp(&other.bound)
-            .then(other.index.cmp(&self.index))
+        self.bound.total_cmp(&other.bound)
     }
 }
-
-/// Bézier control points of a bicubic function on a cell: rows along u.
-type Net = [[f64; 4]; 4];
 
 /// A rectangle on which both radii are polynomials.
 #[derive(Debug, Clone, Copy)]
@@ -175,36 +181,6 @@ impl Cell {
         }
         parts
     }
-
-    /// Least and greatest control point of a derivative ∂^{a+b}/∂u^a ∂θ^b of a net.
-    fn range(&self, net: &Net, a: usize, b: usize) -> (f64, f64) {
-        let mut d = *net;
-        for level in 0..a {
-            let factor = (3 - level) as f64 / (2.0 * self.span.x);
-            for i in 0..3 - level {
-                for j in 0..4 {
-                    d[i][j] = factor * (d[i + 1][j] - d[i][j]);
-                }
-            }
-        }
-        for level in 0..b {
-            let factor = (3 - level) as f64 / (2.0 * self.span.y);
-            for row in &mut d[..4 - a] {
-                for j in 0..3 - level {
-                    row[j] = factor * (row[j + 1] - row[j]);
-                }
-            }
-        }
-        let points = d[..4 - a].iter().flat_map(|row| &row[..4 - b]);
-        points.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
-            (low.min(x), high.max(x))
-        })
-    }
-
-    fn most(&self, net: &Net, a: usize, b: usize) -> f64 {
-        let (low, high) = self.range(net, a, b);
-        high.max(-low)
-    }
 }
 
 /// A bound of |x| and |x'| over a cell, and one of |x − x'|.
@@ -247,8 +223,8 @@ impl Mul<f64> for Size {
 /// Of a vector, by its two components.
 fn long(a: Size, b: Size) -> Size {
     Size {
-        most: a.most.hypot(b.most),
-        change: a.change.hypot(b.change),
+        most: DVec2::new(a.most, b.most).length(),
+        change: DVec2::new(a.change, b.change).length(),
     }
 }
 
@@ -257,6 +233,8 @@ struct Pair<'a> {
     heights: [f64; 2],
     /// Of both ends: a − a' and b − b'.
     lifts: [f64; 2],
+    /// Both are surfaces of revolution.
+    round: bool,
 }
 
 /// Sizes on a cell: of 1/f and 1/H, of f's derivatives, and of X.
@@ -276,92 +254,127 @@ impl<'a> Pair<'a> {
             surfaces: [first, second],
             heights: [first, second].map(|s| s.top() - s.bottom()),
             lifts: [first.bottom() - second.bottom(), first.top() - second.top()],
+            round: first.of_revolution().is_some() && second.of_revolution().is_some(),
         }
     }
 
-    /// The patches of the splines.
-    fn patches(&self) -> Vec<Cell> {
-        let [first, second] = self.surfaces.map(Surface::bezier_nets);
-        let (rows, columns) = self.surfaces[0].shape();
-        let half = DVec2::new(0.5 / (rows - 3) as f64, 0.5 * TAU / columns as f64);
-        first
-            .into_iter()
-            .zip(second)
-            .enumerate()
-            .flat_map(|(patch, (first, second))| {
-                let (i, j) = (patch / columns, patch % columns);
-                [Distance::Points, Distance::Normals].map(|of| Cell {
-                    of,
-                    nets: [first, second, difference(&first, &second)],
-                    bends: [f64::INFINITY; 3],
-                    depth: 0,
-                    span: half,
-                    center: DVec2::new((2 * i + 1) as f64, (2 * j + 1) as f64) * half,
-                    half,
-                })
-            })
-            .collect()
+    /// The patches of the splines, without second derivatives: cheap, and enough to put most aside.
+    fn patches(&self) -> Vec<Entry> {
+        let [first, second] = self.surfaces;
+        let (_, columns) = first.shape();
+        let pairs = first.coefficients().iter().zip(second.coefficients());
+        let difference: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let [one, other, apart] = [first.coefficients(), second.coefficients(), &difference]
+            .map(|coefficients| ranges_on_patches(coefficients, columns));
+        let lift = self.lifts[0].abs().max(self.lifts[1].abs());
+        // Surfaces of revolution are the same at every angle.
+        let looked_at = if self.round { 1 } else { columns };
+        let mut entries = Vec::with_capacity(2 * one.len());
+        for patch in (0..one.len()).filter(|patch| patch % columns < looked_at) {
+            let sizes = self.sizes([one[patch], other[patch], apart[patch]]);
+            entries.push(Entry {
+                bound: DVec2::new(apart[patch][0].most(), lift).length(),
+                part: Part::Patch(patch, Distance::Points),
+            });
+            entries.push(Entry {
+                bound: (sizes.slow * sizes.x.change)
+                    .min(self.rough_bound(one[patch], other[patch])),
+                part: Part::Patch(patch, Distance::Normals),
+            });
+        }
+        entries
     }
 
-    fn sizes(&self, cell: &Cell, difference: &Net) -> Sizes {
-        let [first, second, _] = &cell.nets;
-        let range = |a: usize, b: usize| {
-            let (one, other) = (cell.range(first, a, b), cell.range(second, a, b));
-            (one, other)
+    /// How far normals are apart: that of two normals, and what others differ from these.
+    fn rough_bound(&self, one: [Range; 3], other: [Range; 3]) -> f64 {
+        let mut spread = 0.0;
+        let [n, m] = [(one, self.heights[0]), (other, self.heights[1])].map(|(ranges, height)| {
+            let [f, fu, ft] = ranges;
+            let x = [ft.over(f), fu * (1.0 / height)];
+            let least = DVec3::new(1.0, x[0].least(), x[1].least());
+            spread += DVec2::new(x[0].half(), x[1].half()).length() / least.length();
+            DVec3::new(-1.0, x[0].middle(), x[1].middle()).normalize()
+        });
+        n.distance(m) + spread
+    }
+
+    fn cell(&self, patch: usize, of: Distance) -> Cell {
+        let (rows, columns) = self.surfaces[0].shape();
+        let (i, j) = (patch / columns, patch % columns);
+        let [first, second] = self.surfaces.map(|surface| surface.bezier_net(i, j));
+        let span = DVec2::new(0.5 / (rows - 3) as f64, 0.5 * TAU / columns as f64);
+        Cell {
+            of,
+            nets: [first, second, difference(&first, &second)],
+            bends: [f64::INFINITY; 3],
+            depth: 0,
+            span,
+            center: DVec2::new((2 * i + 1) as f64, (2 * j + 1) as f64) * span,
+            half: if self.round {
+                DVec2::new(span.x, 0.0)
+            } else {
+                span
+            },
+        }
+    }
+
+    /// From the ranges of f, f_u and f_θ of both surfaces and of their difference.
+    fn sizes(&self, [first, second, difference]: [[Range; 3]; 3]) -> Sizes {
+        let size = |k: usize| Size {
+            most: first[k].most().max(second[k].most()),
+            change: difference[k].most(),
         };
-        let size =
-            |((low, high), (other_low, other_high)): ((f64, f64), (f64, f64)), change| Size {
-                most: high.max(-low).max(other_high).max(-other_low),
-                change,
-            };
         // How far from 0 all values of both surfaces are.
-        let away = |((low, high), (other_low, other_high)): ((f64, f64), (f64, f64))| {
-            low.min(other_low).max(-high.max(other_high)).max(0.0)
+        let away = |k: usize| {
+            let (one, other) = (first[k], second[k]);
+            one.low
+                .min(other.low)
+                .max(-one.high.max(other.high))
+                .max(0.0)
         };
-        let (values, by_u, by_theta) = (range(0, 0), range(1, 0), range(0, 1));
         let r = Size {
-            most: 1.0 / values.0.0.min(values.1.0),
-            change: cell.most(difference, 0, 0) / (values.0.0 * values.1.0),
+            most: 1.0 / first[0].low.min(second[0].low),
+            change: difference[0].most() / (first[0].low * second[0].low),
         };
         let [one, other] = self.heights;
         let inverse_height = Size {
             most: 1.0 / one.min(other),
             change: (one - other).abs() / (one * other),
         };
-        let fu = size(by_u, cell.most(difference, 1, 0));
-        let ft = size(by_theta, cell.most(difference, 0, 1));
-        let steep =
-            (away(by_theta) / values.0.1.max(values.1.1)).hypot(away(by_u) / one.max(other));
+        let (fu, ft) = (size(1), size(2));
+        let steep = DVec3::new(
+            1.0,
+            away(2) / first[0].high.max(second[0].high),
+            away(1) / one.max(other),
+        );
         Sizes {
             r,
             inverse_height,
             fu,
             ft,
             x: long(ft * r, fu * inverse_height),
-            slow: 1.0 / 1.0_f64.hypot(steep),
+            slow: steep.length().recip(),
         }
     }
 
-    /// No second derivatives: cheap, and enough to put most patches aside.
-    fn rough_bound(&self, cell: &Cell) -> f64 {
-        let difference = &cell.nets[2];
-        if cell.of == Distance::Points {
-            let lift = self.lifts[0].abs().max(self.lifts[1].abs());
-            return cell.most(difference, 0, 0).hypot(lift);
-        }
-        let sizes = self.sizes(cell, difference);
-        (sizes.slow * sizes.x.change).min(2.0)
-    }
-
-    /// Bounds a cell after trying its centre and the corner that promises most; `None` if the
-    /// largest distance of all is not in it.
+    /// Bounds a cell after trying its centre and the corner that promises most, and says whether to
+    /// halve it along u; `None` if the largest distance of all is not in it.
     ///
     /// Where ‖δ‖ is shown to grow all over the cell in one direction, it is largest on the edge: if
     /// that is an end of the surfaces, only the edge is left, else the largest is beyond it.
-    fn examine(&self, cell: &mut Cell, index: usize, best: &mut SurfaceDistance) -> Option<Entry> {
+    fn examine(&self, cell: &mut Cell, best: &mut SurfaceDistance) -> Option<(f64, bool)> {
         // Below that, derivatives of the nets would be rounding.
-        if cell.depth <= DEEPEST {
-            let tighter = self.bends(cell);
+        let mut most = f64::INFINITY;
+        if cell.depth <= DEEPEST && (cell.depth < 4 || cell.depth.is_multiple_of(4)) {
+            let ranges = cell.nets.map(|net| ranges_on(&net, cell.span));
+            if cell.of == Distance::Normals {
+                let [one, other, _] = ranges.map(|r| [r[0][0], r[1][0], r[0][1]]);
+                most = self.rough_bound(one, other);
+                if most < best.value {
+                    return None;
+                }
+            }
+            let tighter = self.bends(cell.of, &ranges);
             cell.bends = std::array::from_fn(|k| cell.bends[k].min(tighter[k]));
         }
         let [uu, ut, tt] = cell.bends;
@@ -408,29 +421,21 @@ impl<'a> Pair<'a> {
                 (longest, corner) = (length, cell.center + sign * cell.half);
             }
         }
-        for at in [cell.center, corner] {
-            let [value, ..] = self.difference(cell.of, at);
-            if value.length() > best.value {
-                best.value = value.length();
-                best.at = [at.x.clamp(0.0, 1.0), at.y.rem_euclid(TAU)];
-            }
+        best.improve(value.length(), cell.center);
+        if longest > best.value {
+            best.improve(self.difference(cell.of, corner)[0].length(), corner);
         }
         let bound = longest + 0.5 * (uu * x * x + 2.0 * ut * x * y + tt * y * y);
         // What halving the cell in a direction would take off, roughly.
         let gain_u = along_u.length() + uu * x * x + ut * x * y;
         let gain_theta = along_theta.length() + tt * y * y + ut * x * y;
-        Some(Entry {
-            bound,
-            index,
-            split: Some(x > 0.0 && gain_u >= gain_theta),
-        })
+        Some((bound.min(most), x > 0.0 && gain_u >= gain_theta))
     }
 
     /// Bounds of the second derivatives uu, uθ, θθ of δ over a cell.
-    fn bends(&self, cell: &Cell) -> [f64; 3] {
-        let difference = &cell.nets[2];
-        if cell.of == Distance::Points {
-            return [(2, 0), (1, 1), (0, 2)].map(|(a, b)| cell.most(difference, a, b));
+    fn bends(&self, of: Distance, ranges: &[Ranges; 3]) -> [f64; 3] {
+        if of == Distance::Points {
+            return [(2, 0), (1, 1), (0, 2)].map(|(a, b)| ranges[2][a][b].most());
         }
         let Sizes {
             r,
@@ -439,11 +444,11 @@ impl<'a> Pair<'a> {
             ft,
             x,
             slow,
-        } = self.sizes(cell, difference);
-        let [first, second, _] = &cell.nets;
+        } = self.sizes(ranges.map(|r| [r[0][0], r[1][0], r[0][1]]));
+        let [first, second, difference] = ranges;
         let size = |a: usize, b: usize| Size {
-            most: cell.most(first, a, b).max(cell.most(second, a, b)),
-            change: cell.most(difference, a, b),
+            most: first[a][b].most().max(second[a][b].most()),
+            change: difference[a][b].most(),
         };
         let (fuu, fut, ftt) = (size(2, 0), size(1, 1), size(0, 2));
         let (fuuu, fuut, futt, fttt) = (size(3, 0), size(2, 1), size(1, 2), size(0, 3));
@@ -476,59 +481,8 @@ impl<'a> Pair<'a> {
             second(xtt, xt, xt),
         ];
         // Far apart, the sum of what each normal may do is less.
-        let [one, other] = [0, 1].map(|k| self.normal_bends(cell, k));
+        let [one, other] = [0, 1].map(|k| normal_bends(&ranges[k], self.heights[k]));
         std::array::from_fn(|k| together[k].min(one[k] + other[k]))
-    }
-
-    /// Bounds of n_uu, n_uθ, n_θθ of one surface over a cell.
-    ///
-    /// With M = (−H f, H f_θ, f f_u) and W_a = M × M_a, n_a = W_a × M/‖M‖³ and
-    /// ‖n_ab‖ ≤ ‖∂_b W_a‖/‖M‖² + 4 ‖W_a‖ ‖M_b‖/‖M‖³. In the W's what only lengthens M cancels.
-    fn normal_bends(&self, cell: &Cell, surface: usize) -> [f64; 3] {
-        let net = &cell.nets[surface];
-        let h = self.heights[surface];
-        let most = |a: usize, b: usize| cell.most(net, a, b);
-        let away = |a: usize, b: usize| {
-            let (low, high) = cell.range(net, a, b);
-            low.max(-high).max(0.0)
-        };
-        let (f, fu, ft) = (most(0, 0), most(1, 0), most(0, 1));
-        let (fuu, fut, ftt) = (most(2, 0), most(1, 1), most(0, 2));
-        let (fuuu, fuut, futt, fttt) = (most(3, 0), most(2, 1), most(1, 2), most(0, 3));
-        let long = |x: f64, y: f64, z: f64| DVec3::new(x, y, z).length();
-        let least = away(0, 0);
-        let m = long(h * least, h * away(0, 1), least * away(1, 0));
-        let mu = long(h * fu, h * fut, fu * fu + f * fuu);
-        let mt = long(h * ft, h * ftt, ft * fu + f * fut);
-        let wu = long(
-            h * (ft * (fu * fu + f * fuu) + f * fu * fut),
-            h * f * f * fuu,
-            h * h * (ft * fu + f * fut),
-        );
-        let wt = long(
-            h * (ft * (ft * fu + f * fut) + f * fu * ftt),
-            h * f * f * fut,
-            h * h * (f * ftt + ft * ft),
-        );
-        let wuu = long(
-            h * (ft * (3.0 * fu * fuu + f * fuuu) + f * fu * fuut),
-            h * f * (2.0 * fu * fuu + f * fuuu),
-            h * h * (ft * fuu + f * fuut),
-        );
-        let wut = long(
-            h * (ftt * (fu * fu + f * fuu)
-                + ft * (fu * fut + ft * fuu + f * fuut)
-                + f * (fut * fut + fu * futt)),
-            h * f * (2.0 * ft * fuu + f * fuut),
-            h * h * (ftt * fu + f * futt),
-        );
-        let wtt = long(
-            h * (ft * (ftt * fu + 2.0 * ft * fut + f * futt) + f * fu * fttt),
-            h * f * (2.0 * ft * fut + f * futt),
-            h * h * (ft * ftt + f * fttt),
-        );
-        let bound = |w2: f64, w: f64, mb: f64| w2 / (m * m) + 4.0 * w * mb / (m * m * m);
-        [bound(wuu, wu, mu), bound(wut, wu, mt), bound(wtt, wt, mt)]
     }
 
     /// δ_c or δ_n with its derivatives by u and θ, in the frame that turns with θ.
@@ -545,6 +499,52 @@ impl<'a> Pair<'a> {
         let [n, m] = [normal(&a, self.heights[0]), normal(&b, self.heights[1])];
         std::array::from_fn(|i| n[i] - m[i])
     }
+}
+
+/// Bounds of n_uu, n_uθ, n_θθ of one surface of height `h` over a cell.
+///
+/// With M = (−H f, H f_θ, f f_u) and W_a = M × M_a, n_a = W_a × M/‖M‖³ and
+/// ‖n_ab‖ ≤ ‖∂_b W_a‖/‖M‖² + 4 ‖W_a‖ ‖M_b‖/‖M‖³. In the W's what only lengthens M cancels.
+fn normal_bends(ranges: &Ranges, h: f64) -> [f64; 3] {
+    let most = |a: usize, b: usize| ranges[a][b].most();
+    let away = |a: usize, b: usize| ranges[a][b].least();
+    let (f, fu, ft) = (most(0, 0), most(1, 0), most(0, 1));
+    let (fuu, fut, ftt) = (most(2, 0), most(1, 1), most(0, 2));
+    let (fuuu, fuut, futt, fttt) = (most(3, 0), most(2, 1), most(1, 2), most(0, 3));
+    let long = |x: f64, y: f64, z: f64| DVec3::new(x, y, z).length();
+    let least = away(0, 0);
+    let m = long(h * least, h * away(0, 1), least * away(1, 0));
+    let mu = long(h * fu, h * fut, fu * fu + f * fuu);
+    let mt = long(h * ft, h * ftt, ft * fu + f * fut);
+    let wu = long(
+        h * (ft * (fu * fu + f * fuu) + f * fu * fut),
+        h * f * f * fuu,
+        h * h * (ft * fu + f * fut),
+    );
+    let wt = long(
+        h * (ft * (ft * fu + f * fut) + f * fu * ftt),
+        h * f * f * fut,
+        h * h * (f * ftt + ft * ft),
+    );
+    let wuu = long(
+        h * (ft * (3.0 * fu * fuu + f * fuuu) + f * fu * fuut),
+        h * f * (2.0 * fu * fuu + f * fuuu),
+        h * h * (ft * fuu + f * fuut),
+    );
+    let wut = long(
+        h * (ftt * (fu * fu + f * fuu)
+            + ft * (fu * fut + ft * fuu + f * fuut)
+            + f * (fut * fut + fu * futt)),
+        h * f * (2.0 * ft * fuu + f * fuut),
+        h * h * (ftt * fu + f * futt),
+    );
+    let wtt = long(
+        h * (ft * (ftt * fu + 2.0 * ft * fut + f * futt) + f * fu * fttt),
+        h * f * (2.0 * ft * fut + f * futt),
+        h * h * (ft * ftt + f * fttt),
+    );
+    let bound = |w2: f64, w: f64, mb: f64| w2 / (m * m) + 4.0 * w * mb / (m * m * m);
+    [bound(wuu, wu, mu), bound(wut, wu, mt), bound(wtt, wt, mt)]
 }
 
 fn difference(first: &Net, second: &Net) -> Net {
