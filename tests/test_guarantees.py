@@ -1,5 +1,7 @@
 """Certified radii are never contradicted."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,21 @@ def tilt(normals, axes, chord):
     return np.cos(angle) * normals + np.sin(angle) * across
 
 
+def attacks(contacts, normals, center, radius, rng, n, **options):
+    """Qualities of configurations on the boundary of the ball of the paper's metric.
+
+    Half at random, half against the gradient of the quality.
+    """
+    moves, axes = sphere(rng, (n, len(contacts))), sphere(rng, (n, len(contacts)))
+    slope = gm.quality_gradient(contacts, normals, center, **options)
+    lengths = np.linalg.norm(slope.contacts, axis=1, keepdims=True)
+    moves[::2] = -slope.contacts / np.maximum(lengths, 1e-9) + 0.3 * moves[::2]
+    moves /= np.linalg.norm(moves, axis=-1, keepdims=True)
+    axes[::2] = -slope.normals + 0.1 * axes[::2]
+    tilted = tilt(np.broadcast_to(normals, axes.shape), axes, radius)
+    return gm.quality(contacts + radius * moves, tilted, center, **options)
+
+
 @pytest.mark.parametrize("m", [3, 4])
 @pytest.mark.parametrize(("friction", "edges"), [(1.0, 8), (0.5, 5)])
 def test_no_grasp_within_the_radius_is_lost(m, friction, edges):
@@ -31,24 +48,49 @@ def test_no_grasp_within_the_radius_is_lost(m, friction, edges):
     q = gm.quality(*grasps, **options)
     certified = 0
     for contacts, normals, center in zip(*(a[q > 0.03][:6] for a in grasps), strict=True):
-        placed = gm.PlacedGrasp(contacts, normals, center)
-        radius = gm.certified_radius(placed, **options)
-        if radius == 0.0:
-            continue
-        certified += 1
-        n = 2500
-        # On the boundary of the ball: at random, and against the gradient.
-        moves = sphere(rng, (n, m))
-        axes = sphere(rng, (n, m))
-        slope = gm.quality_gradient(contacts, normals, center, **options)
-        lengths = np.linalg.norm(slope.contacts, axis=1, keepdims=True)
-        moves[::2] = -slope.contacts / np.maximum(lengths, 1e-9) + 0.3 * moves[::2]
-        moves /= np.linalg.norm(moves, axis=-1, keepdims=True)
-        axes[::2] = -slope.normals + 0.1 * axes[::2]
-        moved = contacts + radius * moves
-        tilted = tilt(np.broadcast_to(normals, axes.shape), axes, radius)
-        assert gm.quality(moved, tilted, center, **options).min() > 0.0
+        radius = gm.certified_radius(gm.PlacedGrasp(contacts, normals, center), **options)
+        if radius > 0.0:
+            certified += 1
+            found = attacks(contacts, normals, center, radius, rng, 10_000, **options)
+            assert found.min() > 0.0
     assert certified > 0
+
+
+def test_nor_is_the_best_grasp_of_any_model():
+    rng = np.random.default_rng(82)
+    for surface in MODELS.values():
+        placed = gm.place(surface, gm.synthesize(surface, top=1)[0].grasp)
+        radius = gm.certified_radius(placed)
+        assert radius > 0.05
+        parts = placed.contacts, placed.normals, placed.center_of_mass
+        assert attacks(*parts, radius, rng, 10_000).min() > 0.0
+        # The attack is worth its name: a few radii further out it succeeds.
+        further = [attacks(*parts, k * radius, rng, 10_000).min() for k in (2, 3, 4, 5)]
+        assert min(further) == 0.0
+
+
+def test_no_grasp_moves_further_than_the_bound():
+    rng = np.random.default_rng(83)
+    surfaces = gm.sample_combinations(list(MODELS.values()), 6, seed=3, concentration=0.3)
+    for source, target in itertools.pairwise(surfaces):
+        bound = gm.transfer_bound(source, target)
+        grasp = gm.Grasp(rng.random(3000), 2 * np.pi * rng.random(3000))
+        moved = gm.placed_distance(gm.place(source, grasp), gm.place(target, grasp))
+        assert 0.9 * bound < moved <= bound
+    assert gm.transfer_bound(surfaces[0], surfaces[0]) == 0.0
+
+
+def test_the_distance_of_surfaces_alone_is_no_bound():
+    # Waves on the upper half add area there: the centre of mass moves, by more than any point.
+    def waves(u, theta):
+        rising = 0.5 + 0.5 * np.tanh(40.0 * (u - 0.5))
+        return 5.0 + 0.8 * rising * np.sin(40 * np.pi * u) + 0.0 * theta
+
+    plain = gm.Surface.from_function(lambda u, theta: 5.0 + 0.0 * theta, -50.0, 50.0)
+    waved = gm.Surface.from_function(waves, -50.0, 50.0, tolerance=1e-4)
+    moved = np.linalg.norm(plain.center_of_mass - waved.center_of_mass)
+    assert moved > 2.0 * gm.surface_distance(plain, waved)
+    assert gm.transfer_bound(plain, waved) == pytest.approx(moved)
 
 
 def test_the_centre_of_mass_and_the_frame_of_a_normal_do_not_matter():

@@ -1,4 +1,4 @@
-"""The Grasp Moduli Space: combinations, curves, distances of grasps, transfer."""
+"""The Grasp Moduli Space: combinations, curves, distances."""
 
 import numpy as np
 import pytest
@@ -7,16 +7,6 @@ import graspmoduli as gm
 
 MODELS = gm.shapes.MODELS
 TAU = 2 * np.pi
-
-
-@pytest.fixture(scope="module")
-def grasps():
-    """The best of 100 sampled contacts on some models."""
-    found = {}
-    for name in "aefgk":
-        u, theta = gm.sample_points(MODELS[name], 100, seed=0)
-        found[name] = gm.best_grasps(MODELS[name], u, theta)[0].grasp
-    return found
 
 
 class TestCombinations:
@@ -209,95 +199,3 @@ class TestDistance:
         assert gm.distance(p, q) == pytest.approx(0.3 + 2 * np.sin(0.1))
         with pytest.raises(gm.GraspModuliError, match='angles must be "chord" or "arc"'):
             gm.distance(p, q, angles="degrees")
-
-
-class TestTransfer:
-    def test_naive_keeps_the_coordinates(self, grasps):
-        found = gm.transfer(MODELS["e"], grasps["e"], MODELS["k"])
-        assert found.grasp == grasps["e"]
-        placed = gm.place(MODELS["k"], grasps["e"])
-        assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
-        start = gm.place(MODELS["e"], grasps["e"]).quality()
-        assert found.path[0] == pytest.approx(start, abs=1e-12)
-        assert found.path[-1] == found.quality
-        assert len(found.path) == len(found.t) == 101
-        half = gm.place(gm.combine([MODELS["e"], MODELS["k"]], [0.5, 0.5]), grasps["e"])
-        # The centre of mass on the way is by Simpson's rule.
-        assert found.path[50] == pytest.approx(half.quality(), abs=1e-3)
-
-    @pytest.mark.parametrize("method", ["gradient", "ascent"])
-    def test_quality_is_that_of_the_grasp_and_u_stays_on_the_surface(self, grasps, method):
-        for source in "aefgk":
-            for target in "efg":
-                found = gm.transfer(MODELS[source], grasps[source], MODELS[target], method)
-                placed = gm.place(MODELS[target], found.grasp)
-                assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
-                assert found.status == "force closure"
-                assert (found.grasp.u >= 0).all()
-                assert (found.grasp.u <= 1).all()
-                assert found.t[0] == 0.0
-                assert found.t[-1] == 1.0
-
-    def test_ours_beats_the_papers_in_a_tenth_of_its_evaluations(self, grasps):
-        pairs = [(s, t) for s in "aefgk" for t in "aefgk"]
-        better = 0
-        for source, target in pairs:
-            arguments = MODELS[source], grasps[source], MODELS[target]
-            naive = gm.transfer(*arguments)
-            theirs, ours = (gm.transfer(*arguments, m) for m in ("gradient", "ascent"))
-            assert ours.evaluations <= theirs.evaluations / 10
-            assert ours.quality >= naive.quality
-            better += ours.quality >= theirs.quality
-        assert better >= 0.9 * len(pairs)
-
-    def test_finite_differences_follow_exact_derivatives(self, grasps):
-        arguments = MODELS["f"], grasps["f"], MODELS["k"], "gradient"
-        options = {"surfaces": 20, "steps": 5}
-        exact = gm.transfer(*arguments, **options)
-        finite = gm.transfer(*arguments, difference=1e-6, **options)
-        np.testing.assert_allclose(finite.path, exact.path, atol=2e-3)
-        assert finite.evaluations == 100 * 7 + 21
-        assert exact.evaluations == 100 + 21
-
-    def test_on_one_surface_it_is_an_ascent(self, grasps):
-        start = gm.place(MODELS["g"], grasps["g"]).quality()
-        for method in ("gradient", "ascent"):
-            assert gm.transfer(MODELS["g"], grasps["g"], MODELS["g"], method).quality >= start
-
-    def test_several_at_once_are_as_one_by_one(self, grasps):
-        several = list(grasps.values())
-        for method in ("naive", "gradient", "ascent"):
-            together = gm.transfer(MODELS["a"], several, MODELS["f"], method)
-            for grasp, found in zip(several, together, strict=True):
-                alone = gm.transfer(MODELS["a"], grasp, MODELS["f"], method)
-                assert alone.grasp == found.grasp
-                np.testing.assert_array_equal(alone.path, found.path)
-        assert gm.transfer(MODELS["a"], [], MODELS["f"]) == []
-
-    def test_other_hands(self):
-        surface = MODELS["f"]
-        u, theta = gm.sample_points(surface, 20, seed=2)
-        grasp = gm.best_grasps(surface, u, theta, contacts=4)[0].grasp
-        naive = gm.transfer(surface, grasp, MODELS["k"])
-        moved = gm.transfer(surface, grasp, MODELS["k"], "gradient", surfaces=10, steps=5)
-        assert moved.quality > naive.quality
-        with pytest.raises(gm.GraspModuliError, match="three contacts, got 4"):
-            gm.transfer(surface, grasp, MODELS["k"], "ascent")
-
-    @pytest.mark.parametrize(
-        ("options", "sentence"),
-        [
-            ({"method": "magic"}, "method must be one of naive, gradient, ascent, got 'magic'"),
-            ({"friction": 0}, "friction must be a positive"),
-            ({"surfaces": 0}, "surfaces must be at least 1"),
-            ({"step_length": -1}, "step_length must be a positive"),
-            ({"difference": 0}, "difference must be a positive"),
-        ],
-    )
-    def test_wrong_input(self, grasps, options, sentence):
-        with pytest.raises(gm.GraspModuliError, match=sentence):
-            gm.transfer(MODELS["a"], grasps["a"], MODELS["f"], **options)
-
-    def test_wrong_grasps(self, grasps):
-        with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 3 and 1"):
-            gm.transfer(MODELS["a"], [grasps["a"], gm.Grasp([0.5], [0.0])], MODELS["f"])

@@ -7,9 +7,10 @@ one grasp              :class:`WrenchSpace`: status, weakest direction, forces a
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:`distance`,
-                       :func:`interpolate`, :func:`transfer`, :func:`sample_combinations`,
-                       :func:`closest_combination`
-guarantees             :func:`certified_radius`, :func:`certify_transfer`
+                       :func:`interpolate`, :func:`quality_along`, :func:`transfer`,
+                       :func:`sample_combinations`, :func:`closest_combination`
+guarantees             :func:`certified_radius`, :func:`certify_transfer`,
+                       :func:`transfer_bound`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
 real objects           :func:`fit`
 errors                 :class:`GraspModuliError`
@@ -35,15 +36,14 @@ from .grasps import place as place
 from .guarantees import Certificate as Certificate
 from .guarantees import certified_radius as certified_radius
 from .guarantees import certify_transfer as certify_transfer
+from .guarantees import transfer_bound as transfer_bound
 from .moduli import SurfaceDistance as SurfaceDistance
-from .moduli import Transfer as Transfer
 from .moduli import distance as distance
 from .moduli import interpolate as interpolate
 from .moduli import placed_distance as placed_distance
 from .moduli import sample_combinations as sample_combinations
 from .moduli import sample_weights as sample_weights
 from .moduli import surface_distance as surface_distance
-from .moduli import transfer as transfer
 from .quality import Bounds as Bounds
 from .quality import Extreme as Extreme
 from .quality import QualityGradient as QualityGradient
@@ -60,5 +60,9 @@ from .surfaces import combine as combine
 from .surfaces import project as project
 from .synthesis import best_grasps as best_grasps
 from .synthesis import synthesize as synthesize
+from .transfers import QualityAlong as QualityAlong
+from .transfers import Transfer as Transfer
+from .transfers import quality_along as quality_along
+from .transfers import transfer as transfer
 from .wrench_space import Resistance as Resistance
 from .wrench_space import WrenchSpace as WrenchSpace

@@ -166,3 +166,13 @@ def locked(array: Floats) -> Floats:
 def _brief(value: Any) -> str:
     text = repr(value).replace("\n", " ")
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def cells(allowed: ArrayLike | None) -> NDArray[np.bool_] | None:
+    """Where contacts may lie: booleans of shape (rows, columns), or everywhere."""
+    if allowed is None:
+        return None
+    grid = np.ascontiguousarray(allowed, dtype=np.bool_)
+    if grid.ndim != 2 or not grid.size:
+        raise GraspModuliError(f"allowed must have shape (rows, columns), got {grid.shape}")
+    return grid

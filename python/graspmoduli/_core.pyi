@@ -123,4 +123,10 @@ class Deformation:
         length: float,
         difference: float | None,
     ) -> list[Transferred]: ...
-    def by_ascent(self, grasps: Floats, friction: float, edges: int) -> list[Transferred]: ...
+    def by_ascent(
+        self,
+        grasps: Floats,
+        friction: float,
+        edges: int,
+        allowed: NDArray[np.bool_] | None,
+    ) -> list[Transferred]: ...

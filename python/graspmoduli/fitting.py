@@ -22,6 +22,7 @@ from .quality import quality
 from .reading import Object, read
 from .surfaces import Surface
 from .synthesis import synthesize
+from .transfers import transfer
 from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
 
 #: More unexplained than this is refused.
@@ -60,9 +61,9 @@ class ObjectGrasp:
     grasp: Grasp
     #: Q_l of what follows, with lengths divided by ``length_scale``.
     quality: float
-    #: Contact points, in the unit of the object. Shape (3, 3).
+    #: Contact points, in the unit of the object. Shape (m, 3).
     contacts: Floats
-    #: Unit normals pointing into the object. Shape (3, 3).
+    #: Unit normals pointing into the object. Shape (m, 3).
     normals: Floats
     #: Centre of mass of the fitted surface. Shape (3,).
     center_of_mass: Floats
@@ -111,20 +112,82 @@ class Fit:
             seed=seed,
             allowed=self.allowed,
         )
-        center = locked(self.to_object(self.surface.center_of_mass))
-        grasps = []
-        for ranked in found:
-            u, theta = ranked.grasp.u, ranked.grasp.theta
-            contacts = locked(self.to_object(self.surface.points(u, theta)))
-            normals = locked(self.directions_to_object(self.surface.normals(u, theta)))
-            # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l
-            # there differs slightly from the surface's own.
-            value = quality(
-                contacts / scale, normals, center / scale, friction=friction, edges=edges
-            )
-            if value > 0.0:
-                grasps.append(ObjectGrasp(ranked.grasp, value, contacts, normals, center, scale))
-        return sorted(grasps, key=lambda grasp: -grasp.quality)
+        # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in those
+        # of the object differs slightly from the surface's own.
+        grasps = [self.in_object(ranked.grasp, friction=friction, edges=edges) for ranked in found]
+        return sorted((g for g in grasps if g.quality > 0.0), key=lambda grasp: -grasp.quality)
+
+    def in_object(self, grasp: Grasp, *, friction: float = 1.0, edges: int = 8) -> ObjectGrasp:
+        """A grasp on the fitted surface, in the object's own coordinates."""
+        contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
+        normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
+        return self._object_grasp(grasp, contacts, normals, friction, edges)
+
+    def on_mesh(
+        self, mesh: Any, grasp: Grasp, *, friction: float = 1.0, edges: int = 8
+    ) -> ObjectGrasp:
+        """A grasp as the object's own mesh sees it, not the fitted surface.
+
+        Contacts are the nearest points of the mesh, normals those of its faces there, pointing to
+        the side that the surface's do.
+
+        Parameters
+        ----------
+        mesh
+            As for :func:`fit`, with faces.
+        grasp
+            Contact coordinates on the fitted surface.
+        friction, edges
+            As in :func:`graspmoduli.quality`.
+        """
+        thing = read(mesh)
+        if thing.faces is None:
+            raise GraspModuliError("mesh must have faces, got points only")
+        from trimesh.triangles import closest_point
+
+        flat = self.in_object(grasp, friction=friction, edges=edges)
+        triangles = thing.points[thing.faces]
+        sides = triangles[:, 1:] - triangles[:, :1]
+        across = np.cross(sides[:, 0], sides[:, 1])
+        area = np.linalg.norm(across, axis=1)
+        triangles, across = triangles[area > 0.0], across[area > 0.0] / area[area > 0.0, None]
+        contacts, normals = [], []
+        for point, normal in zip(flat.contacts, flat.normals, strict=True):
+            near = closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
+            face = int(((near - point) ** 2).sum(axis=1).argmin())
+            contacts.append(near[face])
+            normals.append(np.where(across[face] @ normal < 0.0, -1.0, 1.0) * across[face])
+        return self._object_grasp(grasp, np.array(contacts), np.array(normals), friction, edges)
+
+    def transfer_to(
+        self,
+        target: Fit,
+        grasp: Grasp,
+        method: str = "ascent",
+        *,
+        friction: float = 1.0,
+        edges: int = 8,
+    ) -> ObjectGrasp:
+        """A grasp of this object carried to another one, in that one's own coordinates.
+
+        :func:`graspmoduli.transfer` between the fitted surfaces, each divided by its
+        :attr:`length_scale`; the ascent offers contacts only where the target is explained by its
+        surface or was not seen.
+        """
+        start, end = ((1.0 / fit.length_scale) * fit.surface for fit in (self, target))
+        allowed = target.allowed if method == "ascent" else None
+        carried = transfer(
+            start, grasp, end, method, friction=friction, edges=edges, allowed=allowed
+        )
+        return target.in_object(carried.grasp, friction=friction, edges=edges)
+
+    def _object_grasp(
+        self, grasp: Grasp, contacts: Floats, normals: Floats, friction: float, edges: int
+    ) -> ObjectGrasp:
+        scale = self.length_scale
+        center = self.to_object(self.surface.center_of_mass)
+        value = quality(contacts / scale, normals, center / scale, friction=friction, edges=edges)
+        return ObjectGrasp(grasp, value, locked(contacts), locked(normals), locked(center), scale)
 
     def to_object(self, points: Floats) -> Floats:
         """Points from the surface's to the object's coordinates. Shape (..., 3)."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ._arrays import cone
 from .grasps import Grasp, PlacedGrasp, place
+from .moduli import surface_distance
 from .quality import circular_quality
 from .surfaces import Surface
 
@@ -97,3 +98,16 @@ def certify_transfer(
     ]
     radius = certified_radius(p, friction=friction, edges=edges)
     return Certificate(radius, float(max(moved)))
+
+
+def transfer_bound(source: Surface, target: Surface) -> float:
+    """No grasp moves further than this by the naïve transfer (Lemma III.5): d(g, g') ≤ bound.
+
+    The paper's bound is d(S, T), which as defined does not see the centre of mass; as d(g, g')
+    does, the larger of d(S, T), with its error, and ‖z_S − z_T‖ is the bound that holds
+    (docs/mathematics.md shows surfaces for which d(S, T) alone does not).
+    """
+    apart = surface_distance(source, target)
+    moved = np.linalg.norm(source.center_of_mass - target.center_of_mass)
+    # Rounding, in the points and normals themselves.
+    return max(apart + apart.error, float(moved)) * (1.0 + 1e-12)

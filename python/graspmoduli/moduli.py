@@ -1,25 +1,21 @@
-"""The Grasp Moduli Space: pairs of a surface and a grasp on it (Sec. III and IV.D)."""
+"""The Grasp Moduli Space: pairs of a surface and a grasp on it (Sec. III)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, cone, count, floats, locked, number
+from ._arrays import Floats, count, floats, number
 from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp
 from .surfaces import Surface, combine
 
 #: A point of the Grasp Moduli Space: a surface and a grasp on it.
 Point = tuple[Surface, Grasp]
-
-#: How a grasp can be carried to another surface.
-METHODS = ("naive", "gradient", "ascent")
 
 
 def sample_weights(surfaces: int, n: int, seed: int = 0, concentration: ArrayLike = 1.0) -> Floats:
@@ -74,19 +70,24 @@ def interpolate(start: Point, end: Point, t: float) -> Point:
     share = number("t", t)
     if not 0.0 <= share <= 1.0:
         raise GraspModuliError(f"t must lie in [0, 1], got {share}")
-    _same_number(g, h)
-    turn = h.theta - g.theta
-    turn = np.where(turn > np.pi, turn - 2 * np.pi, turn)
-    turn = np.where(turn < -np.pi, turn + 2 * np.pi, turn)
+    turn = shortest_turn(g, h)
     u = np.clip((1.0 - share) * g.u + share * h.u, 0.0, 1.0)
     surface = combine([first, last], [1.0 - share, share])
     return surface, Grasp(u, g.theta + share * turn)
 
 
+def shortest_turn(g: Grasp, h: Grasp) -> Floats:
+    """From the angles of one grasp to those of another, in [−π, π]. Shape (m,)."""
+    same_number(g, h)
+    turn = h.theta - g.theta
+    turn = np.where(turn > np.pi, turn - 2 * np.pi, turn)
+    return np.where(turn < -np.pi, turn + 2 * np.pi, turn)
+
+
 def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     """d(g, g') of Sec. III: the largest distance between corresponding contacts, normals and
     centres of mass."""
-    _same_number(p, q)
+    same_number(p, q)
     return max(
         float(np.linalg.norm(p.contacts - q.contacts, axis=1).max()),
         float(np.linalg.norm(p.normals - q.normals, axis=1).max()),
@@ -139,113 +140,14 @@ def distance(start: Point, end: Point, *, angles: str = "chord") -> float:
     if angles not in ANGLES:
         raise GraspModuliError(f'angles must be "chord" or "arc", got {angles!r}')
     (first, g), (last, h) = start, end
-    _same_number(g, h)
-    turn = np.abs(g.theta - h.theta)
-    arc = np.minimum(turn, 2 * np.pi - turn)
+    arc = np.abs(shortest_turn(g, h))
     apart = arc if angles == "arc" else 2.0 * np.sin(0.5 * arc)
     heights = np.abs(g.u - h.u)
     return float(surface_distance(first, last) + heights.sum() + apart.sum())
 
 
-@dataclass(frozen=True, eq=False)
-class Transfer:
-    """A grasp carried to another surface."""
-
-    #: On the target.
-    grasp: Grasp
-    #: Its Q_l there.
-    quality: float
-    #: Q_l on the way; the last is ``quality``. Shape (k,).
-    path: Floats
-    #: Where on the way: the surfaces were (1 − t) S + t T. Shape (k,).
-    t: Floats
-    #: How many times Q_l, its gradient or its facets were computed.
-    evaluations: int
-
-    @property
-    def status(self) -> str:
-        """``"force closure"`` or ``"lost"``: whether the grasp holds the target."""
-        return "force closure" if self.quality > 0.0 else "lost"
-
-
-def transfer(
-    source: Surface,
-    grasp: Grasp | Sequence[Grasp],
-    target: Surface,
-    method: str = "naive",
-    *,
-    friction: float = 1.0,
-    edges: int = 8,
-    surfaces: int = 100,
-    steps: int = 20,
-    step_length: float = 1e-3,
-    difference: float | None = None,
-) -> Any:
-    """Carries a grasp from one surface to another along (1 − t) S + t T (Def. III.4, Sec. IV.D).
-
-    Parameters
-    ----------
-    source, grasp, target
-        The surface S, a grasp on it or several with the same number of contacts, the surface T.
-    method
-        ``"naive"``: the coordinates stay. ``"gradient"``: the paper's, on each of N₁ surfaces N₂
-        steps x + δ∇Q, u kept in [0, 1]. ``"ascent"``: ours, for three contacts: on surfaces as near
-        to each other as keeps the grasp good, an ascent by all facets of the wrench hull near the
-        origin, then one to a local maximum on T; in few steps, in many and at once, and the best
-        of these.
-    friction, edges
-        As in :func:`graspmoduli.quality`, positive.
-    surfaces
-        N₁; for the naïve transfer, how finely its quality is sampled.
-    steps, step_length
-        N₂ and δ of the gradient method.
-    difference
-        h of forward differences for the gradient method, as in the paper (1e-5); exact derivatives
-        if not given.
-
-    Returns
-    -------
-    Transfer, or a list of them for several grasps
-        Centres of mass on the way are by Simpson's rule on a grid of 20 by 20, as in Sec. IV.E;
-        exact on S and T.
-    """
-    if method not in METHODS:
-        raise GraspModuliError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
-    mu, l = cone(friction, edges)
-    n1, n2 = count("surfaces", surfaces, 1), count("steps", steps, 0)
-    delta = number("step_length", step_length, positive=True)
-    h = None if difference is None else number("difference", difference, positive=True)
-    grasps = [grasp] if isinstance(grasp, Grasp) else list(grasp)
-    for other in grasps[1:]:
-        _same_number(grasps[0], other)
-    if not grasps:
-        return []
-    if method == "ascent" and len(grasps[0]) != 3:
-        raise GraspModuliError(
-            f'method "ascent" is for grasps of three contacts, got {len(grasps[0])}'
-        )
-    start = np.ascontiguousarray([np.stack([g.u, g.theta], axis=1) for g in grasps])
-    way = _core.Deformation(source._core, target._core)
-    if method == "naive":
-        carried = way.naive(start, mu, l, n1)
-    elif method == "gradient":
-        carried = way.by_gradient(start, mu, l, n1, n2, delta, h)
-    else:
-        carried = way.by_ascent(start, mu, l)
-    results = [
-        Transfer(
-            Grasp(at[:, 0], at[:, 1]),
-            float(path[-1, 1]),
-            locked(path[:, 1].copy()),
-            locked(path[:, 0].copy()),
-            evaluations,
-        )
-        for at, path, evaluations in carried
-    ]
-    return results[0] if isinstance(grasp, Grasp) else results
-
-
-def _same_number(first: Any, second: Any) -> None:
+def same_number(first: Any, second: Any) -> None:
+    """Refuses grasps of different numbers of contacts."""
     sizes = [len(g.contacts) if isinstance(g, PlacedGrasp) else len(g) for g in (first, second)]
     if sizes[0] != sizes[1]:
         raise GraspModuliError(

@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, cone, coordinates, count, floats
+from ._arrays import Floats, cells, cone, coordinates, count, floats
 from ._core import GraspModuliError
 from .grasps import Grasp, RankedGrasp
 from .sampling import unit_square
@@ -130,14 +130,16 @@ def synthesize(
     mu, l = cone(friction, edges)
     top = count("top", top, 1)
     followed = top + 1 if starts is None else count("starts", starts, 1)
-    cells: NDArray[np.bool_] | None = None
-    if allowed is not None:
-        cells = np.ascontiguousarray(allowed, dtype=np.bool_)
-        if cells.ndim != 2 or not cells.size:
-            raise GraspModuliError(f"allowed must have shape (rows, columns), got {cells.shape}")
     square = unit_square(EXTRA_SAMPLES, seed)
     rows = _core.synthesize(
-        surface._core, _center(surface, center_of_mass), mu, l, top, followed, square, cells
+        surface._core,
+        _center(surface, center_of_mass),
+        mu,
+        l,
+        top,
+        followed,
+        square,
+        cells(allowed),
     )
     return [RankedGrasp(Grasp(row[0:6:2], row[1:6:2]), float(row[6])) for row in rows]
 

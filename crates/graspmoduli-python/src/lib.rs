@@ -393,23 +393,13 @@ fn synthesize<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
     let square = square.as_slice()?.as_chunks().0;
-    let cells = match &allowed {
-        Some(cells) => Some(Cells {
-            allowed: cells.as_slice()?,
-            columns: cells.as_array().ncols(),
-        }),
-        None => None,
-    };
+    let cells = cells(allowed.as_ref())?;
     let found = py.detach(|| {
-        let region: &dyn Region = match &cells {
-            Some(cells) => cells,
-            None => &Anywhere,
-        };
         synthesis::synthesize(
             &surface.0,
             center_of_mass.into(),
             &cone,
-            region,
+            region(cells.as_ref()),
             top,
             starts,
             square,
@@ -420,6 +410,20 @@ fn synthesize<'py>(
         [u1, t1, u2, t2, u3, t3, grasp.quality]
     });
     table(py, rows.collect())
+}
+
+fn cells<'a>(allowed: Option<&'a PyReadonlyArray2<'_, bool>>) -> PyResult<Option<Cells<'a>>> {
+    let Some(allowed) = allowed else {
+        return Ok(None);
+    };
+    Ok(Some(Cells {
+        allowed: allowed.as_slice()?,
+        columns: allowed.as_array().ncols(),
+    }))
+}
+
+fn region<'a>(cells: Option<&'a Cells<'a>>) -> &'a dyn Region {
+    cells.map_or(&Anywhere, |cells| cells)
 }
 
 /// d(S, S') to a relative error: value, its error bound, and where it is attained.
@@ -493,20 +497,23 @@ impl PyDeformation {
         transferred(py, carried)
     }
 
-    /// The ascent by all facets near the origin, for three contacts.
+    /// The ascent by all facets near the origin, for three contacts; on the target contacts lie in
+    /// the `allowed` cells.
     fn by_ascent<'py>(
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
         friction: f64,
         edges: usize,
+        allowed: Option<PyReadonlyArray2<'py, bool>>,
     ) -> PyResult<Vec<Transferred<'py>>> {
         let cone = cone(friction, edges, 0.0)?;
         let grasps: Vec<_> = coordinates(&grasps)?
             .iter()
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
             .collect();
-        let carried = py.detach(|| self.0.by_ascent(&grasps, &cone));
+        let cells = cells(allowed.as_ref())?;
+        let carried = py.detach(|| self.0.by_ascent(&grasps, &cone, region(cells.as_ref())));
         transferred(py, carried)
     }
 }

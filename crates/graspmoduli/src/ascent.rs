@@ -22,6 +22,9 @@ const MOST_FACETS: usize = 8;
 pub trait Region: Sync {
     /// Is a contact at (u, θ) allowed?
     fn allows(&self, u: f64, theta: f64) -> bool;
+
+    /// The nearest allowed contact, if any; a unit of u and one of θ are as long as given.
+    fn nearest(&self, at: [f64; 2], lengths: [f64; 2]) -> Option<[f64; 2]>;
 }
 
 /// The ascent stops after so many steps, or when it asks for less than a relative gain.
@@ -212,6 +215,10 @@ impl Region for Anywhere {
     fn allows(&self, _: f64, _: f64) -> bool {
         true
     }
+
+    fn nearest(&self, at: [f64; 2], _: [f64; 2]) -> Option<[f64; 2]> {
+        Some(at)
+    }
 }
 
 /// Contacts are allowed in some cells of a grid: row-major, rows over u, columns over θ.
@@ -230,5 +237,28 @@ impl Region for Cells<'_> {
         let row = cell(u, rows);
         let column = cell(theta.rem_euclid(TAU) / TAU, self.columns);
         self.allowed[row * self.columns + column]
+    }
+
+    fn nearest(&self, at: [f64; 2], lengths: [f64; 2]) -> Option<[f64; 2]> {
+        if self.allows(at[0], at[1]) {
+            return Some(at);
+        }
+        let rows = self.allowed.len() / self.columns;
+        let far = |to: &[f64; 2]| {
+            let turn = (to[1] - at[1]).rem_euclid(TAU);
+            (lengths[0] * (to[0] - at[0])).hypot(lengths[1] * turn.min(TAU - turn))
+        };
+        self.allowed
+            .iter()
+            .enumerate()
+            .filter(|&(_, &allowed)| allowed)
+            .map(|(cell, _)| {
+                let (row, column) = (cell / self.columns, cell % self.columns);
+                [
+                    (row as f64 + 0.5) / rows as f64,
+                    (column as f64 + 0.5) * TAU / self.columns as f64,
+                ]
+            })
+            .min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 }

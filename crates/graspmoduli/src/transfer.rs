@@ -1,6 +1,6 @@
 //! Carrying a grasp from one surface to another along (1 − t) S + t S' (Sec. IV.D).
 
-use crate::ascent::{Anywhere, Climber, Coordinates, Effort};
+use crate::ascent::{Anywhere, Climber, Coordinates, Effort, Region};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::{Evaluator, Gradient};
@@ -136,22 +136,34 @@ impl Deformation {
     /// A method of our own, for three contacts: on surfaces as near to each other as keeps the grasp
     /// good, an ascent by all facets near the origin (see [`crate::ascent`]), then one to a local
     /// maximum on the target; in few steps, in many and at once, and the best of these.
-    pub fn by_ascent(&self, grasps: &[Coordinates], cone: &FrictionCone) -> Vec<Carried> {
+    ///
+    /// On the target contacts lie in `region`: from elsewhere they move to its nearest part.
+    pub fn by_ascent(
+        &self,
+        grasps: &[Coordinates],
+        cone: &FrictionCone,
+        region: &dyn Region,
+    ) -> Vec<Carried> {
         grasps
             .par_iter()
             .map_init(
                 || Evaluator::new(cone),
-                |evaluator, start| self.ascend(evaluator, *start),
+                |evaluator, start| self.ascend(evaluator, *start, region),
             )
             .collect()
     }
 
     /// The best of three ways: in few long steps, in many short ones, and at once.
-    fn ascend(&self, evaluator: &mut Evaluator, start: Coordinates) -> Carried {
+    fn ascend(
+        &self,
+        evaluator: &mut Evaluator,
+        start: Coordinates,
+        region: &dyn Region,
+    ) -> Carried {
         let before = evaluator.evaluations();
-        let mut best = self.ascend_in_steps(evaluator, start, 0.25);
+        let mut best = self.ascend_in_steps(evaluator, start, region, 0.25);
         for longest in [1.0 / 12.0, 1.0] {
-            let other = self.ascend_in_steps(evaluator, start, longest);
+            let other = self.ascend_in_steps(evaluator, start, region, longest);
             if other.reached() > best.reached() {
                 best = other;
             }
@@ -164,6 +176,7 @@ impl Deformation {
         &self,
         evaluator: &mut Evaluator,
         start: Coordinates,
+        region: &dyn Region,
         longest: f64,
     ) -> Carried {
         const SHORTEST: f64 = 1.0 / 64.0;
@@ -189,7 +202,16 @@ impl Deformation {
                 t + step
             };
             let (surface, center) = self.at(next);
-            let carried = evaluator.quality(&contacts(&surface, &at), center);
+            let arrived = next == 1.0;
+            let landing = if arrived {
+                at.map(|[u, theta]| {
+                    let lengths = surface.place(u, theta).tangents.map(DVec3::length);
+                    region.nearest([u, theta], lengths).unwrap_or([u, theta])
+                })
+            } else {
+                at
+            };
+            let carried = evaluator.quality(&contacts(&surface, &landing), center);
             if carried < KEPT * quality && step > SHORTEST && longest < 1.0 {
                 step *= 0.5;
                 continue;
@@ -197,11 +219,11 @@ impl Deformation {
             let climber = Climber {
                 surface: &surface,
                 center,
-                region: &Anywhere,
+                region: if arrived { region } else { &Anywhere },
                 round: false,
             };
-            let effort = if next == 1.0 { ARRIVAL } else { ON_THE_WAY };
-            quality = carried;
+            let effort = if arrived { ARRIVAL } else { ON_THE_WAY };
+            (at, quality) = (landing, carried);
             if let Some((better, reached)) = climber.climb(evaluator, at, effort) {
                 (at, quality) = (better, reached);
             }

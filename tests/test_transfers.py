@@ -1,0 +1,214 @@
+"""Quality along curves, and grasps carried between real objects."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import graspmoduli as gm
+from conftest import ROOT
+
+TAU = 2 * np.pi
+
+MODELS = gm.shapes.MODELS
+
+
+@pytest.fixture(scope="module")
+def grasps():
+    """The best of 100 sampled contacts on some models."""
+    found = {}
+    for name in "acefgk":
+        u, theta = gm.sample_points(MODELS[name], 100, seed=0)
+        found[name] = gm.best_grasps(MODELS[name], u, theta)[0].grasp
+    return found
+
+
+class TestQualityAlong:
+    @pytest.mark.parametrize("pair", ["ac", "ef", "ce"])
+    def test_agrees_with_the_curve_and_finds_its_lowest_point(self, grasps, pair):
+        s, t = pair
+        start = MODELS[s], grasps[s]
+        ends = {
+            "surface only": (MODELS[t], grasps[s]),
+            "grasp only": (MODELS[s], grasps[t]),
+            "combined": (MODELS[t], grasps[t]),
+        }
+        for end in ends.values():
+            found = gm.quality_along(start, end, samples=40, edges=6)
+            fine = np.linspace(0.0, 1.0, 401)
+            slow = [gm.place(*gm.interpolate(start, end, x)).quality(edges=6) for x in fine]
+            np.testing.assert_allclose(found.quality, slow[::10], atol=1e-8)
+            assert found.worst_quality <= min(slow) + 1e-8
+            at = gm.place(*gm.interpolate(start, end, found.worst_t)).quality(edges=6)
+            assert at == pytest.approx(found.worst_quality, abs=1e-8)
+            assert found.status == ("force closure" if found.worst_quality > 0 else "lost")
+
+    def test_a_dip_between_samples_is_found(self):
+        # Down and up again within the one interval that is sampled.
+        start, end = ((MODELS[n], gm.synthesize(MODELS[n], top=1)[0].grasp) for n in "cf")
+        fine = gm.quality_along(start, end, samples=2000)
+        assert 0.0 < fine.worst_quality < 0.1 * min(fine.quality[0], fine.quality[-1])
+        for samples in (1, 5, 16, 50):
+            found = gm.quality_along(start, end, samples=samples)
+            assert found.worst_quality == pytest.approx(fine.worst_quality, abs=1e-9)
+            assert found.worst_quality <= found.quality.min()
+
+    def test_a_point_is_a_curve(self, grasps):
+        point = MODELS["f"], grasps["f"]
+        found = gm.quality_along(point, point, samples=3)
+        assert np.ptp(found.quality) <= 1e-14
+        assert found.worst_quality == pytest.approx(gm.place(*point).quality(), abs=1e-14)
+
+    def test_wrong_input(self, grasps):
+        start = MODELS["f"], grasps["f"]
+        with pytest.raises(gm.GraspModuliError, match="samples must be at least 1"):
+            gm.quality_along(start, start, samples=0)
+        with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 3 and 1"):
+            gm.quality_along(start, (MODELS["f"], gm.Grasp([0.5], [0.0])))
+        with pytest.raises(gm.GraspModuliError, match="friction must be a positive"):
+            gm.quality_along(start, start, friction=-1)
+
+
+class TestTransfer:
+    def test_naive_keeps_the_coordinates(self, grasps):
+        found = gm.transfer(MODELS["e"], grasps["e"], MODELS["k"])
+        assert found.grasp == grasps["e"]
+        placed = gm.place(MODELS["k"], grasps["e"])
+        assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
+        start = gm.place(MODELS["e"], grasps["e"]).quality()
+        assert found.path[0] == pytest.approx(start, abs=1e-12)
+        assert found.path[-1] == found.quality
+        assert len(found.path) == len(found.t) == 101
+        half = gm.place(gm.combine([MODELS["e"], MODELS["k"]], [0.5, 0.5]), grasps["e"])
+        # The centre of mass on the way is by Simpson's rule.
+        assert found.path[50] == pytest.approx(half.quality(), abs=1e-3)
+
+    @pytest.mark.parametrize("method", ["gradient", "ascent"])
+    def test_quality_is_that_of_the_grasp_and_u_stays_on_the_surface(self, grasps, method):
+        for source in "aefgk":
+            for target in "efg":
+                found = gm.transfer(MODELS[source], grasps[source], MODELS[target], method)
+                placed = gm.place(MODELS[target], found.grasp)
+                assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
+                assert found.status == "force closure"
+                assert (found.grasp.u >= 0).all()
+                assert (found.grasp.u <= 1).all()
+                assert found.t[0] == 0.0
+                assert found.t[-1] == 1.0
+
+    def test_ours_beats_the_papers_in_a_tenth_of_its_evaluations(self, grasps):
+        pairs = [(s, t) for s in "aefgk" for t in "aefgk"]
+        better = 0
+        for source, target in pairs:
+            arguments = MODELS[source], grasps[source], MODELS[target]
+            naive = gm.transfer(*arguments)
+            theirs, ours = (gm.transfer(*arguments, m) for m in ("gradient", "ascent"))
+            assert ours.evaluations <= theirs.evaluations / 10
+            assert ours.quality >= naive.quality
+            better += ours.quality >= theirs.quality
+        assert better >= 0.9 * len(pairs)
+
+    def test_finite_differences_follow_exact_derivatives(self, grasps):
+        arguments = MODELS["f"], grasps["f"], MODELS["k"], "gradient"
+        options = {"surfaces": 20, "steps": 5}
+        exact = gm.transfer(*arguments, **options)
+        finite = gm.transfer(*arguments, difference=1e-6, **options)
+        np.testing.assert_allclose(finite.path, exact.path, atol=2e-3)
+        assert finite.evaluations == 100 * 7 + 21
+        assert exact.evaluations == 100 + 21
+
+    def test_on_one_surface_it_is_an_ascent(self, grasps):
+        start = gm.place(MODELS["g"], grasps["g"]).quality()
+        for method in ("gradient", "ascent"):
+            assert gm.transfer(MODELS["g"], grasps["g"], MODELS["g"], method).quality >= start
+
+    def test_several_at_once_are_as_one_by_one(self, grasps):
+        several = list(grasps.values())
+        for method in ("naive", "gradient", "ascent"):
+            together = gm.transfer(MODELS["a"], several, MODELS["f"], method)
+            for grasp, found in zip(several, together, strict=True):
+                alone = gm.transfer(MODELS["a"], grasp, MODELS["f"], method)
+                assert alone.grasp == found.grasp
+                np.testing.assert_array_equal(alone.path, found.path)
+        assert gm.transfer(MODELS["a"], [], MODELS["f"]) == []
+
+    def test_other_hands(self):
+        surface = MODELS["f"]
+        u, theta = gm.sample_points(surface, 20, seed=2)
+        grasp = gm.best_grasps(surface, u, theta, contacts=4)[0].grasp
+        naive = gm.transfer(surface, grasp, MODELS["k"])
+        moved = gm.transfer(surface, grasp, MODELS["k"], "gradient", surfaces=10, steps=5)
+        assert moved.quality > naive.quality
+        with pytest.raises(gm.GraspModuliError, match="three contacts, got 4"):
+            gm.transfer(surface, grasp, MODELS["k"], "ascent")
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"method": "magic"}, "method must be one of naive, gradient, ascent, got 'magic'"),
+            ({"friction": 0}, "friction must be a positive"),
+            ({"surfaces": 0}, "surfaces must be at least 1"),
+            ({"step_length": -1}, "step_length must be a positive"),
+            ({"difference": 0}, "difference must be a positive"),
+        ],
+    )
+    def test_wrong_input(self, grasps, options, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            gm.transfer(MODELS["a"], grasps["a"], MODELS["f"], **options)
+
+    def test_wrong_grasps(self, grasps):
+        with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 3 and 1"):
+            gm.transfer(MODELS["a"], [grasps["a"], gm.Grasp([0.5], [0.0])], MODELS["f"])
+
+
+@pytest.fixture(scope="module")
+def fits():
+    paths = sorted((ROOT / "examples" / "objects").glob("*.ply"))
+    return {path: gm.fit(path) for path in paths}
+
+
+class TestBetweenRealObjects:
+    def test_every_carried_grasp_holds_the_targets_mesh(self, fits):
+        for source in fits.values():
+            best = source.synthesize(top=1)[0]
+            for path, target in fits.items():
+                if target is source:
+                    continue
+                carried = source.transfer_to(target, best.grasp)
+                assert carried.quality > 0.0
+                real = target.on_mesh(path, carried.grasp)
+                assert real.quality > 0.5 * carried.quality
+                np.testing.assert_array_equal(real.grasp.u, carried.grasp.u)
+                rows, columns = target.allowed.shape
+                cells = (
+                    np.minimum((carried.grasp.u * rows).astype(int), rows - 1),
+                    (carried.grasp.theta / TAU * columns).astype(int),
+                )
+                assert target.allowed[cells].all()
+
+    def test_on_the_mesh_is_on_the_mesh(self, fits):
+        path, fit = next(iter(fits.items()))
+        grasp = fit.synthesize(top=1)[0].grasp
+        mesh = trimesh.load_mesh(path)
+        real = fit.on_mesh(mesh, grasp)
+        _, distance, _ = trimesh.proximity.closest_point(mesh, real.contacts)
+        assert distance.max() < 1e-9 * fit.residual.size
+        surface = fit.in_object(grasp)
+        off = np.linalg.norm(real.contacts - surface.contacts, axis=1)
+        assert off.max() <= fit.residual.max
+        np.testing.assert_allclose(
+            trimesh.proximity.closest_point(mesh, surface.contacts)[1], off, atol=1e-9
+        )
+        # Whatever way round the mesh's faces are.
+        flipped = fit.on_mesh((mesh.vertices, mesh.faces[:, ::-1]), grasp)
+        np.testing.assert_allclose(flipped.normals, real.normals, atol=1e-12)
+        assert (real.normals * surface.normals).sum(axis=1).min() > 0.9
+
+    def test_wrong_input(self, fits):
+        fit = next(iter(fits.values()))
+        grasp = fit.synthesize(top=1)[0].grasp
+        with pytest.raises(gm.GraspModuliError, match="mesh must have faces"):
+            fit.on_mesh(np.random.default_rng(0).random((100, 3)), grasp)
+        with pytest.raises(gm.GraspModuliError, match="method must be one of"):
+            fit.transfer_to(fit, grasp, "magic")
+        with pytest.raises(gm.GraspModuliError, match='allowed is for method "ascent"'):
+            gm.transfer(MODELS["a"], grasp, MODELS["e"], allowed=fit.allowed)
