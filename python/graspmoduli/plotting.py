@@ -1,89 +1,54 @@
-"""Pictures of objects and grasps. Needs matplotlib; not imported by the package itself."""
+"""Pictures of surfaces, grasps and paths. Needs matplotlib; not imported by the package itself.
+
+Every function returns a :class:`matplotlib.figure.Figure`: ``plot_surface(S).savefig("s.png")``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
 
-from ._arrays import Floats
+from ._arrays import count, floats
+from ._core import GraspModuliError
+from .drawing import (
+    BODY,
+    FILLED,
+    FINGERS,
+    NET,
+    SEEN,
+    Camera,
+    Scene,
+    add_body,
+    add_grasp,
+    add_net,
+    azimuth_of,
+    finish,
+)
 from .fitting import Fit, ObjectGrasp
+from .grasps import Grasp, place
+from .moduli import Point, interpolate, sample_weights
 from .reading import Object
+from .surfaces import Surface, combine
+from .transfers import QualityAlong, Transfer
 
-#: Colours of the three fingers, told apart by the colour-blind too (Okabe & Ito).
-FINGERS = ("#D55E00", "#0072B2", "#009E73")
-BODY = "#d9cfc1"
-NET = "#37506b"
-#: The fitted surface under a cloud of points.
-FILLED = "#e9edf2"
-#: The points.
-SEEN = "#a8763e"
-#: Cones are drawn this long, relative to the object's radius.
-CONE = 0.30
-
-
-class _Scene:
-    """Triangles and lines in space, painted from the farthest to the nearest."""
-
-    def __init__(self) -> None:
-        self.parts: list[tuple[Floats, Floats, Floats, Floats, Floats]] = []
-
-    def add(
-        self, polygons: Floats, depth: Floats, fill: Any, edge: Any, width: float = 0.0
-    ) -> None:
-        """Projected triangles (n, 3, 2) or lines (n, 2, 2), with one colour for all or one each."""
-        count = len(polygons)
-        if polygons.shape[1] == 2:
-            # A line is a triangle without an area: all are drawn at once.
-            polygons = polygons[:, [0, 1, 1]]
-        fills = np.broadcast_to(np.asarray(fill, dtype=float), (count, 4))
-        edges = np.broadcast_to(np.asarray(edge, dtype=float), (count, 4))
-        self.parts.append((polygons, depth, fills, edges, np.full(count, width)))
-
-    def draw(self, axes: Any) -> None:
-        polygons, depths, fills, edges, widths = (
-            np.concatenate(column) for column in zip(*self.parts, strict=True)
-        )
-        order = np.argsort(depths, kind="stable")
-        axes.add_collection(
-            PolyCollection(
-                list(polygons[order]),
-                facecolors=fills[order],
-                edgecolors=edges[order],
-                linewidths=widths[order],
-                capstyle="round",
-            )
-        )
-
-
-class _Camera:
-    """Orthographic view from an azimuth and elevation [rad], with the third axis up."""
-
-    def __init__(self, azimuth: float, elevation: float) -> None:
-        ca, sa, ce, se = (
-            np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation),
-        )  # fmt: skip
-        self.towards = np.array([ca * ce, sa * ce, se])
-        self.right = np.array([-sa, ca, 0.0])
-        self.up = np.cross(self.towards, self.right)
-        light = self.towards + 0.6 * self.up - 0.5 * self.right
-        self.light = light / np.linalg.norm(light)
-
-    def project(self, points: Floats) -> tuple[Floats, Floats]:
-        """Picture coordinates (..., 2) and nearness (...)."""
-        return np.stack([points @ self.right, points @ self.up], axis=-1), points @ self.towards
-
-    def shade(self, color: str, normals: Floats, alpha: float = 1.0) -> Floats:
-        """Colours (n, 4) of faces lit from above the viewer; either side of a face is lit."""
-        facing = normals * np.sign(normals @ self.towards)[:, None]
-        light = 0.52 + 0.48 * np.clip(facing @ self.light, 0.0, 1.0)
-        rgb = np.clip(np.array(to_rgb(color)) * light[:, None] * 1.08, 0.0, 1.0)
-        return np.concatenate([rgb, np.full((len(rgb), 1), alpha)], axis=1)
+#: Lines, told apart by the colour-blind too and by their dashes (Okabe & Ito).
+LINES = (
+    ("#0072B2", "-"),
+    ("#D55E00", "--"),
+    ("#009E73", "-."),
+    ("#CC79A7", (0, (1, 1))),
+    ("#56B4E9", (0, (5, 1, 1, 1, 1, 1))),
+    ("#000000", (0, (6, 3))),
+)
+#: Elevation of the eye above the horizon [rad].
+ELEVATION = 0.32
 
 
 def plot_grasps(
@@ -109,7 +74,7 @@ def plot_grasps(
     )  # fmt: skip
     upper = rows[0].subgridspec(1, 2, wspace=0.02)
     if grasps:
-        azimuth = _azimuth(fit, grasps[0])
+        azimuth = azimuth_of(fit.surface, grasps[0].grasp)
         for column, turn in enumerate((0.0, np.pi)):
             axes = figure.add_subplot(upper[column])
             _draw(axes, thing, fit, grasps[0], azimuth + turn, friction, edges, labels=True)
@@ -120,13 +85,22 @@ def plot_grasps(
         lower = rows[1].subgridspec(1, len(others), wspace=0.05)
         for column, grasp in enumerate(others):
             axes = figure.add_subplot(lower[column])
-            _draw(axes, thing, fit, grasp, _azimuth(fit, grasp), friction, edges, labels=False)
+            _draw(
+                axes,
+                thing,
+                fit,
+                grasp,
+                azimuth_of(fit.surface, grasp.grasp),
+                friction,
+                edges,
+                labels=False,
+            )
             axes.set_title(f"{column + 2}   Q = {grasp.quality:.3f}", fontsize=10, y=-0.12)
     best = f"best grasp: $Q_{{{edges}}}$ = {grasps[0].quality:.4f}" if grasps else "no grasp found"
     figure.suptitle(f"{title}    {best}    (μ = {friction:g})".strip(), fontsize=13, y=0.965)
     handles = [
         Line2D([], [], marker="o", linestyle="", color=color, label=f"finger {i + 1}")
-        for i, color in enumerate(FINGERS)
+        for i, color in enumerate(FINGERS[:3])
     ]
     handles.append(Line2D([], [], color=NET, linewidth=1.0, label="fitted surface"))
     if thing.faces is None:
@@ -138,14 +112,188 @@ def plot_grasps(
     return figure
 
 
-def _azimuth(fit: Fit, grasp: ObjectGrasp) -> float:
-    """Across the plane of the contacts, so that all three are seen."""
-    points = fit.surface.points(grasp.grasp.u, grasp.grasp.theta)
-    normal = np.cross(points[1] - points[0], points[2] - points[0])
-    if np.hypot(normal[0], normal[1]) < 0.3 * np.linalg.norm(normal):
-        # A level grasp: any direction shows it.
-        return float(grasp.grasp.theta[0]) + 0.9
-    return float(np.arctan2(normal[1], normal[0])) + 0.35
+def plot_surface(
+    surface: Surface,
+    grasp: Grasp | None = None,
+    *,
+    friction: float = 1.0,
+    edges: int = 8,
+    title: str = "",
+) -> Figure:
+    """A surface, and a grasp on it with its friction cones, seen from two sides.
+
+    The title gives Q_l, with lengths as they are.
+    """
+    figure = Figure(figsize=(8.4, 5.0), dpi=150, facecolor="white")
+    turn = 0.6 if grasp is None else azimuth_of(surface, grasp)
+    for column, offset in enumerate((0.0, np.pi)):
+        axes = figure.add_axes((0.5 * column, 0.05, 0.5, 0.85))
+        _draw_surface(axes, surface, grasp, turn + offset, friction, edges, labels=True)
+        if column:
+            axes.set_title("from the other side", fontsize=10, color="0.35", y=-0.05)
+    if grasp is not None:
+        value = place(surface, grasp).quality(friction=friction, edges=edges)
+        title = f"{title}    $Q_{{{edges}}}$ = {value:.4f}    (μ = {friction:g})".strip()
+    figure.suptitle(title, fontsize=13, y=0.97)
+    return figure
+
+
+def plot_path(
+    start: Point,
+    end: Point,
+    *,
+    steps: int = 6,
+    friction: float = 1.0,
+    edges: int = 8,
+    title: str = "",
+) -> Figure:
+    """A row of surfaces and grasps along the curve of Eq. (III.1), as in Fig. 4 of the paper."""
+    shares = np.linspace(0.0, 1.0, count("steps", steps, 2))
+    return plot_row(
+        [interpolate(start, end, float(t)) for t in shares],
+        [f"t = {t:.2g}" for t in shares],
+        friction=friction,
+        edges=edges,
+        title=title,
+    )
+
+
+def plot_row(
+    points: Sequence[Point],
+    labels: Sequence[str],
+    *,
+    friction: float = 1.0,
+    edges: int = 8,
+    title: str = "",
+) -> Figure:
+    """Surfaces and grasps side by side, at one scale and from one side, with their Q_l."""
+    n = len(points)
+    figure = Figure(figsize=(max(2.0 * n, 4.0), 3.2), dpi=150, facecolor="white")
+    azimuth = azimuth_of(*points[0])
+    bounds = []
+    for column, ((surface, grasp), label) in enumerate(zip(points, labels, strict=True)):
+        axes = figure.add_axes((column / n, 0.15, 1.0 / n, 0.72))
+        _draw_surface(axes, surface, grasp, azimuth, friction, edges, labels=False)
+        value = place(surface, grasp).quality(friction=friction, edges=edges)
+        # Lost is said in words and in colour.
+        text, color = (f"Q = {value:.3f}", "0.15") if value > 0.0 else ("lost", "#D55E00")
+        axes.set_title(f"{label}\n{text}", fontsize=10, color=color, y=-0.22)
+        bounds.append((*axes.get_xlim(), *axes.get_ylim()))
+    low_x, high_x, low_y, high_y = np.array(bounds).T
+    # Room for the arrows.
+    edge = 0.06 * float((high_y - low_y).max())
+    for axes in figure.axes:
+        axes.set_xlim(low_x.min() - edge, high_x.max() + edge)
+        axes.set_ylim(low_y.min() - edge, high_y.max() + edge)
+    figure.suptitle(title, fontsize=12, y=0.98)
+    return figure
+
+
+def plot_simplex(
+    corners: Sequence[Surface],
+    labels: Sequence[str] = ("", "", ""),
+    *,
+    weights: ArrayLike | None = None,
+    samples: int = 10,
+    seed: int = 0,
+    title: str = "",
+) -> Figure:
+    """Conv(X) of three surfaces, with samples where they lie in the triangle (Fig. 1 of the paper).
+
+    ``weights`` are barycentric coordinates, shape (n, 3); if not given, ``samples`` of them are
+    drawn uniformly.
+    """
+    if len(corners) != 3 or len(labels) != 3:
+        raise GraspModuliError(
+            f"corners and labels must be three each, got {len(corners)} and {len(labels)}"
+        )
+    if weights is None:
+        inside = sample_weights(3, samples, seed)
+    else:
+        inside = floats("weights", weights)
+        if inside.ndim != 2 or inside.shape[1] != 3:
+            raise GraspModuliError(f"weights must have shape (n, 3), got {inside.shape}")
+    # Those below are drawn over those above.
+    inside = inside[np.argsort(-inside[:, 2], kind="stable")]
+    figure = Figure(figsize=(8.0, 7.2), dpi=150, facecolor="white")
+    axes = figure.add_axes((0.0, 0.0, 1.0, 0.95))
+    triangle = np.array([[0.14, 0.16], [0.86, 0.16], [0.5, 0.80]])
+    axes.plot(*triangle[[0, 1, 2, 0]].T, color="0.75", linewidth=1.2, zorder=0)
+    places = inside @ triangle
+    axes.plot(*places.T, "o", color=NET, markersize=3, zorder=1)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.0)
+    axes.axis("off")
+    shapes = [*corners, *(combine(corners, w) for w in inside)]
+    # All at one scale: a window of the same size around each.
+    reach = max(s.radius_about((0.0, 0.0, 0.5 * (s.bottom + s.top))) for s in shapes)
+    camera = Camera(0.6, ELEVATION)
+    for index, (surface, (x, y)) in enumerate(zip(shapes, [*triangle, *places], strict=True)):
+        corner = index < 3
+        size = 0.24 if corner else 0.115
+        window = figure.add_axes((x - 0.5 * size, 0.95 * y - 0.5 * size, size, size))
+        scene = Scene()
+        add_body(scene, camera, surface, "#8fb0c9" if corner else BODY, 32 if corner else 20)
+        scene.draw(window)
+        window.set_aspect("equal")
+        middle = 0.5 * (surface.bottom + surface.top) * np.cos(ELEVATION)
+        window.set_xlim(-reach, reach)
+        window.set_ylim(middle - reach, middle + reach)
+        window.axis("off")
+        if corner and labels[index]:
+            above = -0.15 if index < 2 else 0.135
+            axes.text(x, y + above, labels[index], ha="center", va="center", fontsize=12)
+    figure.suptitle(title, fontsize=13, y=0.98)
+    return figure
+
+
+def plot_quality(
+    paths: Mapping[str, QualityAlong | Transfer], *, edges: int = 8, title: str = ""
+) -> Figure:
+    """Q_l along paths, each with its lowest point marked (Fig. 9 of the paper)."""
+    figure = Figure(figsize=(7.2, 4.2), dpi=150, facecolor="white", layout="constrained")
+    axes = figure.add_subplot()
+    for (label, path), (color, dashes) in zip(paths.items(), cycle(LINES)):
+        if isinstance(path, QualityAlong):
+            values, (at, least) = path.quality, (path.worst_t, path.worst_quality)
+        else:
+            values, lowest = path.path, int(path.path.argmin())
+            at, least = path.t[lowest], path.path[lowest]
+        axes.plot(path.t, values, color=color, linestyle=dashes, linewidth=1.8, label=label)
+        axes.plot(at, least, "v", color=color, markersize=7, clip_on=False, zorder=3)
+    axes.plot([], [], "v", color="0.3", label="lowest")
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("t along the path")
+    axes.set_ylabel(f"grasp quality $Q_{{{edges}}}$")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.92")
+    axes.legend(frameon=False, fontsize=9)
+    axes.set_title(title, fontsize=12)
+    return figure
+
+
+def _draw_surface(
+    axes: Any,
+    surface: Surface,
+    grasp: Grasp | None,
+    azimuth: float,
+    friction: float,
+    edges: int,
+    *,
+    labels: bool,
+) -> None:
+    camera = Camera(azimuth, ELEVATION)
+    scene = Scene()
+    add_body(scene, camera, surface)
+    add_net(scene, camera, surface)
+    if grasp is None:
+        scene.draw(axes)
+    else:
+        add_grasp(
+            axes, scene, camera, surface, grasp, friction=friction, edges=edges, labels=labels
+        )
+    finish(axes)
 
 
 def _draw(
@@ -160,29 +308,21 @@ def _draw(
     labels: bool,
 ) -> None:
     """One view, in the coordinates of the fitted surface: its axis points up."""
-    camera = _Camera(azimuth, 0.32)
-    scene = _Scene()
-    scale = fit.length_scale
+    camera = Camera(azimuth, ELEVATION)
+    scene = Scene()
     _add_object(scene, camera, thing, fit)
-    _add_net(scene, camera, fit)
-    points = fit.surface.points(grasp.grasp.u, grasp.grasp.theta)
-    normals = fit.surface.normals(grasp.grasp.u, grasp.grasp.theta)
-    for i in range(3):
-        _add_cone(scene, camera, points[i], normals[i], FINGERS[i], friction, edges, CONE * scale)
-    scene.draw(axes)
-    for i in range(3):
-        _add_contact(axes, camera, points[i], normals[i], i, scale, labels)
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.margins(0.04)
-    axes.axis("off")
+    add_net(scene, camera, fit.surface)
+    add_grasp(
+        axes, scene, camera, fit.surface, grasp.grasp, friction=friction, edges=edges, labels=labels
+    )
+    finish(axes)
 
 
-def _add_object(scene: _Scene, camera: _Camera, thing: Object, fit: Fit) -> None:
+def _add_object(scene: Scene, camera: Camera, thing: Object, fit: Fit) -> None:
     rotation, origin = fit.pose[:3, :3], fit.pose[:3, 3]
     local = (thing.points - origin) @ rotation
     if thing.faces is None:
-        _add_body(scene, camera, fit)
+        add_body(scene, camera, fit.surface, FILLED)
         # Points as small squares of two triangles each.
         shown = local[:: max(1, len(local) // 6000)]
         flat, depth = camera.project(shown)
@@ -201,100 +341,3 @@ def _add_object(scene: _Scene, camera: _Camera, thing: Object, fit: Fit) -> None
     colors = camera.shade(BODY, normals)
     # Edges in the faces' own colours close the seams between them.
     scene.add(flat, depth.mean(axis=1), colors, colors, 0.3)
-
-
-def _add_body(scene: _Scene, camera: _Camera, fit: Fit) -> None:
-    """The fitted surface itself, where there is no mesh to draw."""
-    u, theta = np.meshgrid(np.linspace(0.0, 1.0, 49), np.linspace(0, 2 * np.pi, 73), indexing="ij")
-    points, normals = fit.surface.points(u, theta), fit.surface.normals(u, theta)
-    for corners in (((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1))):
-        grid = [points[i : i + 48, k : k + 72].reshape(-1, 3) for i, k in corners]
-        flat, depth = camera.project(np.stack(grid, axis=1))
-        colors = camera.shade(FILLED, normals[:48, :72].reshape(-1, 3))
-        # Behind the points that lie on it.
-        scene.add(flat, depth.mean(axis=1) - 0.02 * fit.residual.size, colors, colors, 0.3)
-
-
-def _add_net(scene: _Scene, camera: _Camera, fit: Fit) -> None:
-    """Lines of constant u and θ on the visible side of the fitted surface."""
-    surface = fit.surface
-    lift = 0.012 * fit.residual.size
-    around = np.linspace(0.0, 2 * np.pi, 97)
-    upward = np.linspace(0.0, 1.0, 97)
-    for values, rings in ((np.linspace(0.0, 1.0, 13), True), (around[:-1:4], False)):
-        for value in values:
-            u, theta = (value, around) if rings else (upward, value)
-            points, normals = surface.points(u, theta), surface.normals(u, theta)
-            visible = (normals @ camera.towards) < 0.0
-            segments = np.stack([points[:-1], points[1:]], axis=1)[visible[:-1]]
-            if len(segments):
-                flat, depth = camera.project(segments)
-                line = to_rgba(NET, 0.45)
-                scene.add(flat, depth.mean(axis=1) + lift, (0, 0, 0, 0), line, 0.55)
-
-
-def _add_cone(
-    scene: _Scene,
-    camera: _Camera,
-    point: Floats,
-    normal: Floats,
-    color: str,
-    friction: float,
-    edges: int,
-    length: float,
-) -> None:
-    """The friction cone mirrored to the finger's side, as faces between its edges."""
-    axis = -normal
-    side = np.cross(axis, [0.0, 0.0, 1.0])
-    if np.linalg.norm(side) < 1e-6:
-        side = np.array([1.0, 0.0, 0.0])
-    side = side / np.linalg.norm(side)
-    other = np.cross(axis, side)
-    angles = 2 * np.pi * np.arange(edges + 1) / edges
-    # Wide cones are cut shorter, so that all are of a size.
-    height = length / np.hypot(1.0, friction)
-    rim = point + height * (
-        axis + friction * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other)
-    )
-    apex = np.broadcast_to(point, (edges, 3))
-    faces = np.stack([apex, rim[:-1], rim[1:]], axis=1)
-    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    flat, depth = camera.project(faces)
-    scene.add(
-        flat, depth.mean(axis=1), camera.shade(color, normals, 0.42), to_rgba(color, 0.9), 0.6
-    )
-
-
-def _add_contact(
-    axes: Any,
-    camera: _Camera,
-    point: Floats,
-    normal: Floats,
-    index: int,
-    scale: float,
-    labels: bool,
-) -> None:
-    """A dot at the contact, the normal from outside to it, and the finger's number."""
-    color = FINGERS[index]
-    hidden = float(normal @ camera.towards) > 0.0
-    alpha = 0.5 if hidden else 1.0
-    flat, _ = camera.project(point)
-    tail, _ = camera.project(point - normal * CONE * 1.25 * scale)
-    axes.annotate(
-        "", flat, tail,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.4, "alpha": alpha},
-    )  # fmt: skip
-    # A contact behind the object is drawn as a ring.
-    axes.plot(
-        *flat, "o", markersize=6 if labels else 4, markeredgecolor=color, markeredgewidth=1.3,
-        color="white" if hidden else color,
-    )  # fmt: skip
-    if labels:
-        away = tail - flat
-        length = np.linalg.norm(away)
-        place = tail + (away / length if length > 0.0 else np.array([0.0, 1.0])) * 0.09 * scale
-        axes.text(
-            *place, str(index + 1), color=color, fontsize=12, fontweight="bold",
-            ha="center", va="center",
-        )  # fmt: skip

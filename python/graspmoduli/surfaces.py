@@ -380,7 +380,10 @@ def closest_combination(surface: Surface, surfaces: Sequence[Surface]) -> Floats
 
 
 def project(surface: Surface) -> Surface:
-    """π(S): the surface of revolution with the mean radius over θ (Sec. IV.E); exact."""
+    """π(S): the surface of revolution with the mean radius over θ (Sec. IV.E); exact.
+
+    The way there is ``interpolate((S, g), (project(S), g), t)``, or ``transfer`` to it.
+    """
     return Surface(surface._core.project())
 
 
