@@ -130,3 +130,28 @@ class Deformation:
         edges: int,
         allowed: NDArray[np.bool_] | None,
     ) -> list[Transferred]: ...
+
+def random_grasps(seed: int, number: int, count: int) -> Floats: ...
+def grasps_near(
+    grasps: Floats, epsilon: float, samples: int, seed: int, number: int
+) -> Floats: ...
+def survey(
+    seed: int,
+    number: int,
+    count: int,
+    friction: float,
+    edges: int,
+    thresholds: list[float],
+    bins: int,
+    width: float,
+) -> tuple[int, int, list[int], list[int], float]: ...
+def smallest_nearby(
+    seed: int,
+    number: int,
+    count: int,
+    friction: float,
+    edges: int,
+    threshold: float,
+    samples: int,
+    neighbourhoods: list[tuple[float, int]],
+) -> tuple[int, list[float]]: ...

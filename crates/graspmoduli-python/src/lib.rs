@@ -1,6 +1,8 @@
 //! Python binding: borrow, release the interpreter, call, map the error. Arguments come checked
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
+mod domain;
+
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
 use graspmoduli::distance;
@@ -535,6 +537,8 @@ fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferre
 /// The compiled kernels of graspmoduli.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
     #[pymodule_export]
     use super::{
         GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,

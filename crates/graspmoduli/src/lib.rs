@@ -23,6 +23,7 @@
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
+//! | [`domain`] | random grasps in the domain D(1), and near each other |
 //! | [`transfer`] | carrying grasps from one surface to another |
 //! | [`error`] | what can be wrong with a request |
 //!
@@ -31,6 +32,7 @@
 pub mod ascent;
 pub mod contact;
 pub mod distance;
+pub mod domain;
 pub mod error;
 mod nnls;
 pub mod quality;

@@ -156,7 +156,7 @@ impl Evaluator {
 
     /// Q_l if it is below `threshold`, else `threshold`.
     #[inline]
-    fn quality_below(
+    pub(crate) fn quality_below(
         &mut self,
         contacts: &[Contact],
         center_of_mass: DVec3,
