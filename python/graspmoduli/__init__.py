@@ -11,7 +11,8 @@ the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:
                        :func:`sample_combinations`, :func:`closest_combination`
 guarantees             :func:`certified_radius`, :func:`certify_transfer`,
                        :func:`transfer_bound`
-finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`
+finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
+                       :func:`plane_grasp`
 real objects           :func:`fit`
 errors                 :class:`GraspModuliError`
 =====================  ======================================================================
@@ -59,6 +60,7 @@ from .surfaces import closest_combination as closest_combination
 from .surfaces import combine as combine
 from .surfaces import project as project
 from .synthesis import best_grasps as best_grasps
+from .synthesis import plane_grasp as plane_grasp
 from .synthesis import synthesize as synthesize
 from .transfers import QualityAlong as QualityAlong
 from .transfers import Transfer as Transfer

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from typing import Any
 
 import numpy as np
@@ -176,3 +177,11 @@ def cells(allowed: ArrayLike | None) -> NDArray[np.bool_] | None:
     if grid.ndim != 2 or not grid.size:
         raise GraspModuliError(f"allowed must have shape (rows, columns), got {grid.shape}")
     return grid
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, cells, cone, coordinates, count, floats
+from ._arrays import Floats, cells, cone, coordinates, cores, count, floats
 from ._core import GraspModuliError
 from .grasps import Grasp, RankedGrasp
+from .quality import largest_quality
 from .sampling import unit_square
 from .surfaces import Surface
 
@@ -67,7 +67,7 @@ def best_grasps(
     if us.size < size:
         raise GraspModuliError(f"u and theta must hold at least {size} contacts, got {us.size}")
     top = count("top", top, 1)
-    workers = _cores() if threads is None else count("threads", threads, 1)
+    workers = cores() if threads is None else count("threads", threads, 1)
     ranked = _core.best_subsets(
         np.ascontiguousarray(surface.points(us, thetas)),
         np.ascontiguousarray(surface.normals(us, thetas)),
@@ -144,6 +144,35 @@ def synthesize(
     return [RankedGrasp(Grasp(row[0:6:2], row[1:6:2]), float(row[6])) for row in rows]
 
 
+def plane_grasp(
+    surface: Surface, *, heights: int = 10, friction: float = 1.0, edges: int = 8
+) -> RankedGrasp | None:
+    """The best of the triples (u₁, 0), (u₂, π), (u₃, π), u₂ < u₃: the heuristic of Sec. IV.E.
+
+    Made for surfaces of revolution, whose best grasps lie in a plane with the axis. The heights are
+    equally spaced from 0 to 1; ten of them give the paper's 450 triples.
+
+    Returns
+    -------
+    RankedGrasp, or None if no triple is force closure
+    """
+    n = count("heights", heights, 2)
+    u = np.linspace(0.0, 1.0, n)
+    one, two, three = (
+        index.ravel()
+        for index in np.meshgrid(np.arange(n), np.arange(n), np.arange(n), indexing="ij")
+    )
+    one, two, three = (index[two < three] for index in (one, two, three))
+    at = np.concatenate([u, u]), np.repeat([0.0, np.pi], n)
+    triples = np.stack([one, n + two, n + three], axis=1)
+    placed = surface.points(*at)[triples], surface.normals(*at)[triples]
+    best = largest_quality(*placed, surface.center_of_mass, friction=friction, edges=edges)
+    if best.quality == 0.0:
+        return None
+    row = triples[best.index[0]]
+    return RankedGrasp(Grasp(at[0][row], at[1][row]), best.quality)
+
+
 def _center(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, float, float]:
     center: Floats = (
         surface.center_of_mass
@@ -153,11 +182,3 @@ def _center(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, 
     if center.shape != (3,):
         raise GraspModuliError(f"center_of_mass must have shape (3,), got {center.shape}")
     return float(center[0]), float(center[1]), float(center[2])
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1
