@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-extras lint format bench clean prerequisites
+.PHONY: help demo test test-extras lint format reproduce bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -22,9 +22,9 @@ test: $(READY) ## Every test, Rust and Python
 	$(BIN)/pytest --numprocesses auto --ignore tests/extras \
 	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py python tests
 
-test-extras: $(READY) ## The tests of torch and jax: installs both, several gigabytes
+test-extras: $(READY) ## The tests of torch, jax and dask: installs them, several gigabytes
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
-	    --editable '.[torch,jax]'
+	    --editable '.[torch,jax,dask]'
 	$(BIN)/pytest tests/extras
 
 lint: $(READY) ## Formatting, clippy, ruff and types
@@ -38,6 +38,9 @@ format: $(READY) ## Format the sources
 	cargo fmt
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+reproduce: $(READY) ## The paper's experiments at the quick scale: report in out/reproduction/
+	$(BIN)/graspmoduli reproduce --out out/reproduction
 
 bench: $(READY) ## Speed, side by side with SciPy in one run
 	$(BIN)/python benchmarks/bench.py --markdown docs/benchmarks.md

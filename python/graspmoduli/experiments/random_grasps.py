@@ -211,6 +211,8 @@ def _neighbourhood(good: Floats, around: Floats) -> Figure:
             axes.plot(flat[:, :, 0].T, flat[:, :, 1].T, color=color, alpha=0.35, linewidth=0.7)
         for axes, tail, length in ((left, base[0, i], 0.2), (right, np.zeros(3), 1.2)):
             flat, _ = camera.project(np.stack([tail, tail + length * axes_of[0, i]]))
+            # The picture's limits do not see arrows.
+            axes.plot(*flat.T, color="none")
             axes.annotate(
                 "", flat[1], flat[0], arrowprops={"arrowstyle": "-|>", "color": color, "lw": 2}
             )
@@ -264,8 +266,8 @@ def fig7(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
                 IN_KIND, refuted is None,
                 "" if refuted is None else
                 f"the paper's {paper:g} does not stand: the search finds a grasp with Q₈ ≥ "
-                f"{delta:g} and one within {refuted:.4f} of it that is lost; with all normals of the good "
-                "grasp away from −e₃, where R(n) is not continuous, within "
+                f"{delta:g} and one within {refuted:.4f} of it that is lost; with all normals of "
+                "the good grasp away from −e₃, where R(n) is not continuous, within "
                 f"{'none' if limits[0] is None else f'{limits[0]:.4f}'}. The lower end is proven "
                 "(docs/mathematics.md)",
             ),
@@ -309,8 +311,8 @@ def _panel(delta: float, epsilons: Floats, sampled: Floats, away: Floats, pole: 
         )
     axes.axvline(PAPER[delta], color="0.6", linewidth=1.0)
     axes.annotate(
-        "the paper's\nestimate", (PAPER[delta], axes.get_ylim()[1]), fontsize=8, color="0.4",
-        ha="left", va="top", xytext=(3, 0), textcoords="offset points",
+        "the paper's\nestimate", (PAPER[delta], 0.72 * axes.get_ylim()[1]), fontsize=8,
+        color="0.4", ha="left", va="top", xytext=(3, 0), textcoords="offset points",
     )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("ε")

@@ -93,23 +93,15 @@ def proven_radius(
 
     0 where turning the polygonal cones could already cost δ.
     """
-    left, speed, cos = _left(delta, friction, edges, radius)
-    if left <= 0.0:
-        return 0.0
-    # ρ (speed + ρ) √(1 + μ²cos²) = left.
-    lever = left / np.hypot(1.0, friction * cos)
-    return float(0.5 * (np.sqrt(speed * speed + 4.0 * lever) - speed)) * (1.0 - 1e-9)
-
-
-def _left(delta: float, friction: float, edges: int, radius: float) -> tuple[float, float, float]:
-    """What is left of δ for inscribed circular cones, and the largest ‖V‖ + ‖ω‖."""
-    cos = float(np.cos(np.pi / edges))
-    # Lever arms are at most 2r: the fastest a contact moves under a unit twist.
+    cos = np.cos(np.pi / edges)
+    # Lever arms are at most 2r: how fast a contact moves under a unit twist.
     fastest = np.hypot(1.0, 2.0 * radius)
-    # x + μy ≥ δ and x² + y² ≤ fastest²: the largest y.
     a = 1.0 + friction**2
     across = (friction * delta + np.sqrt(max(a * fastest**2 - delta**2, 0.0))) / a
-    return delta - friction * (1.0 - cos) * across, float(np.hypot(1.0, 2.0 * radius + 1.0)), cos
+    left = delta - friction * (1.0 - cos) * across
+    speed = np.hypot(1.0, friction * cos) * np.hypot(1.0, 2.0 * radius + 1.0)
+    # Rounding.
+    return float(max(left, 0.0) / speed * (1.0 - 1e-9))
 
 
 def _slope(rows: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,336 @@
+"""The paper's experiments: random grasps, bad neighbours, and runs that survive being killed."""
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.stats import kstest
+
+import graspmoduli as gm
+import reference
+from graspmoduli import _core
+from graspmoduli.experiments import EXPERIMENTS, FAMILIES, NAMES, reproduce
+from graspmoduli.experiments.settings import SCALES
+from graspmoduli.experiments.store import Piece, Store
+from graspmoduli.experiments.worst import proven_radius, split, worst_neighbour
+
+#: Small enough for a test.
+TINY = replace(
+    SCALES["quick"], survey_pieces=6, survey_grasps=5_000, near05_pieces=4, near05_grasps=1_000,
+    near20_pieces=4, near20_grasps=20_000, search_starts=40, search_rounds=4, fig9_sources="j",
+)  # fmt: skip
+#: No chance in a fixed seed: this only says how unlikely it was chosen.
+UNLIKELY = 1e-3
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    monkeypatch.setitem(SCALES, "quick", TINY)
+
+
+def rows_of(seed, number, count):
+    return _core.random_grasps(seed, number, count)
+
+
+class TestRandomGrasps:
+    def test_are_uniform_in_the_domain(self):
+        contacts, normals, centers = split(rows_of(5, 0, 20_000))
+        for points in (*np.moveaxis(contacts, 1, 0), centers):
+            length = np.linalg.norm(points, axis=1)
+            assert kstest(length**3, "uniform").pvalue > UNLIKELY
+            # Uniform in a ball: each coordinate of the direction is uniform.
+            for axis in range(3):
+                assert kstest(points[:, axis] / length, "uniform", (-1, 2)).pvalue > UNLIKELY
+        for directions in np.moveaxis(normals, 1, 0):
+            np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-15)
+            for axis in range(3):
+                assert kstest(directions[:, axis], "uniform", (-1, 2)).pvalue > UNLIKELY
+            azimuth = np.arctan2(directions[:, 1], directions[:, 0])
+            assert kstest(azimuth, "uniform", (-np.pi, 2 * np.pi)).pvalue > UNLIKELY
+
+    @pytest.mark.parametrize("epsilon", [1e-3, 0.1, 1.0, 2.0])
+    def test_neighbours_are_uniform_in_balls_and_caps(self, epsilon):
+        base = rows_of(6, 1, 1)
+        contacts, normals, centers = split(_core.grasps_near(base, epsilon, 20_000, 6, 77))
+        c, n, z = split(base)
+        for points, middle in (
+            (contacts[:, 0], c[0, 0]),
+            (contacts[:, 2], c[0, 2]),
+            (centers, z[0]),
+        ):
+            off = (points - middle) / epsilon
+            length = np.linalg.norm(off, axis=1)
+            assert kstest(length**3, "uniform").pvalue > UNLIKELY
+            for axis in range(3):
+                assert kstest(off[:, axis] / length, "uniform", (-1, 2)).pvalue > UNLIKELY
+        for i in range(3):
+            # Area of a cap goes with its height, which is half the squared chord.
+            chord = np.linalg.norm(normals[:, i] - n[0, i], axis=1)
+            assert kstest((chord / epsilon) ** 2, "uniform").pvalue > UNLIKELY
+            side = np.cross(n[0, i], [0.3, -0.5, 0.8])
+            side /= np.linalg.norm(side)
+            around = np.arctan2(normals[:, i] @ np.cross(n[0, i], side), normals[:, i] @ side)
+            assert kstest(around, "uniform", (-np.pi, 2 * np.pi)).pvalue > UNLIKELY
+
+    def test_streams_are_the_same_bits_and_independent(self):
+        np.testing.assert_array_equal(rows_of(1, 2, 10), rows_of(1, 2, 20)[:10])
+        assert not (rows_of(1, 2, 10) == rows_of(1, 3, 10)).any()
+        assert not (rows_of(2, 2, 10) == rows_of(1, 2, 10)).any()
+
+    def test_a_survey_counts_what_the_kernel_says(self):
+        unstable, _, at_least, histogram, largest = _core.survey(
+            3, 4, 20_000, 1.0, 8, [0.05, 0.2], 100, 0.005
+        )
+        q = gm.quality(*split(rows_of(3, 4, 20_000)))
+        assert unstable == (q == 0).sum()
+        assert at_least == [(q >= 0.05).sum(), (q >= 0.2).sum()]
+        assert largest == q.max()
+        wanted, _ = np.histogram(q[q > 0], 0.005 * np.arange(101))
+        np.testing.assert_array_equal(histogram, wanted)
+
+    def test_strictly_outside_is_what_a_linear_program_says(self):
+        count = 400
+        rows = rows_of(3, 9, count)
+        unstable, outside, *_ = _core.survey(3, 9, count, 1.0, 8, [], 1, 1.0)
+        apart = 0
+        for contacts, normals, center in zip(*split(rows), strict=True):
+            w = reference.wrenches(contacts, normals, center, 1.0)
+            # 0 is in the hull if some convex combination of the wrenches vanishes.
+            found = linprog(
+                np.zeros(len(w)), A_eq=np.vstack([w.T, np.ones(len(w))]), b_eq=[0] * 6 + [1]
+            )
+            apart += found.status == 2
+        assert outside == apart
+        assert unstable > outside
+
+
+class TestWorstNeighbours:
+    @pytest.fixture(scope="class")
+    def good(self):
+        rows = rows_of(0, 0, 200_000)
+        q = gm.quality(*split(rows))
+        return {delta: rows[q >= delta][:100] for delta in (0.05, 0.2)}
+
+    @pytest.mark.parametrize("pole", [False, True])
+    @pytest.mark.parametrize(("delta", "epsilon"), [(0.05, 0.01), (0.2, 0.04)])
+    def test_are_a_good_grasp_and_a_neighbour(self, good, delta, epsilon, pole):
+        found = worst_neighbour(good[delta], delta, epsilon, 15, pole=pole)
+        grasp, near = (
+            gm.PlacedGrasp(*(part[0] for part in split(row[None])))
+            for row in (found.grasp, found.neighbour)
+        )
+        assert grasp.quality() >= delta
+        assert near.quality() == found.smallest
+        assert gm.placed_distance(grasp, near) <= epsilon
+        points = np.vstack([grasp.contacts, grasp.center_of_mass])
+        assert (np.linalg.norm(points, axis=1) <= 1.0 + 1e-12).all()
+        # Far worse than what sampling finds.
+        sampled = _core.grasps_near(good[delta], epsilon, 50, 1, 2)
+        assert found.smallest < 0.9 * gm.quality(*split(sampled)).min()
+        if pole:
+            assert grasp.normals[0, 2] == -1.0
+
+    def test_the_papers_estimates_do_not_stand(self, good):
+        for delta, epsilon in ((0.05, 0.02), (0.2, 0.1)):
+            assert worst_neighbour(good[delta], delta, epsilon, 30).smallest == 0.0
+
+    def test_nothing_within_the_proven_radius_is_lost(self, good):
+        radius = proven_radius(0.2)
+        assert 0.01 < radius < 0.05
+        assert proven_radius(0.05) == 0.0
+        for pole in (False, True):
+            found = worst_neighbour(good[0.2], 0.2, radius, 20, pole=pole)
+            assert found.smallest > 0.0
+        # More edges lose less when a cone turns.
+        assert proven_radius(0.2, edges=32) > radius
+        assert proven_radius(0.05, edges=32) > 0.0
+
+
+class TestReproduce:
+    def test_every_figure_has_its_rows_and_pictures(self, tiny, tmp_path):
+        steps = []
+        outcomes = reproduce(out=tmp_path, threads=2, progress=steps.append)
+        assert list(outcomes) == [f"fig{k}" for k in range(1, 13)]
+        results = json.loads((tmp_path / "results.json").read_text())
+        assert results["configuration"]["survey_grasps"] == 5_000
+        page = (tmp_path / "report.html").read_text()
+        for name, (title, *_) in EXPERIMENTS.items():
+            assert f"{name}: {title}" in page
+            assert results["experiments"][name]["title"] == title
+            assert list(tmp_path.glob(f"{name}*.png"))
+        # Self-contained: nothing is loaded from anywhere.
+        assert "http" not in page.replace("https://", "").replace('charset="utf-8"', "")
+        assert page.count("<img") == page.count("data:image/png;base64,")
+        assert 'src="data:' in page
+        markdown = (tmp_path / "report.md").read_text()
+        for row in results["experiments"]["fig5"]["rows"]:
+            assert row["what"] in markdown
+        totals = {name: FAMILIES[name].pieces(TINY) for name in ("fig8", "fig10")}
+        assert [s for s in steps if s.name == "fig10"][-1].done == totals["fig10"]
+
+    def test_the_number_of_threads_does_not_matter(self, tiny, tmp_path):
+        names = ["fig5", "fig7", "fig10", "fig11", "fig12"]
+        texts = set()
+        for threads in (1, 2, 4):
+            reproduce(names, out=tmp_path / str(threads), threads=threads)
+            texts.add((tmp_path / str(threads) / "results.json").read_bytes())
+        assert len(texts) == 1
+
+    def test_what_is_there_is_not_computed_again(self, tiny, tmp_path, monkeypatch):
+        reproduce(["fig5"], out=tmp_path)
+        first = (tmp_path / "results.json").read_bytes()
+        with Store(tmp_path, json.loads(first)["configuration"]) as store:
+            assert store.done() == {Piece("survey", k) for k in range(6)}
+        steps = []
+        reproduce(["fig5"], out=tmp_path, progress=steps.append)
+        assert [step.done for step in steps] == [6]
+        assert (tmp_path / "results.json").read_bytes() == first
+
+    def test_another_configuration_is_refused(self, tiny, tmp_path, monkeypatch):
+        reproduce(["fig5"], out=tmp_path)
+        before = (tmp_path / "results.json").read_bytes()
+        monkeypatch.setitem(SCALES, "quick", replace(TINY, seed=1))
+        with pytest.raises(gm.GraspModuliError, match="seed 0 there, 1 asked for"):
+            reproduce(["fig5"], out=tmp_path)
+        assert (tmp_path / "results.json").read_bytes() == before
+
+    def test_the_table_has_all_numbers_and_no_pictures(self, tiny, tmp_path):
+        outcomes = reproduce(["table"], out=tmp_path)
+        assert list(outcomes) == ["fig5", "fig7", "fig8", "fig9", "fig10", "fig11", "fig12"]
+        assert all(outcome.rows for outcome in outcomes.values())
+        assert not list(tmp_path.glob("*.png"))
+
+    @pytest.mark.parametrize(
+        ("options", "sentence"),
+        [
+            ({"names": ["fig13"]}, "name must be one of fig1, .* got 'fig13'"),
+            ({"scale": "huge"}, "scale must be one of quick, paper, got 'huge'"),
+            ({"threads": 0}, "threads must be at least 1"),
+            ({"workers": 0}, "workers must be at least 1"),
+            ({"workers": 2, "scheduler": "tcp://x"}, "exclude each other"),
+        ],
+    )
+    def test_wrong_input(self, tmp_path, options, sentence):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            reproduce(**{"names": ["fig5"], "out": tmp_path, **options})
+
+    def test_a_folder_that_is_a_file(self, tiny, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(gm.GraspModuliError, match="out must be a folder that results"):
+            reproduce(["fig5"], out=tmp_path / "file")
+
+    def test_something_else_in_the_place_of_the_store(self, tiny, tmp_path):
+        (tmp_path / "pieces.sqlite").write_text("not a database, not a database, not a database")
+        with pytest.raises(gm.GraspModuliError, match="not a database"):
+            reproduce(["fig5"], out=tmp_path)
+
+
+#: Runs as `python -c RUN FOLDER`: the tiny scale in a process of its own.
+RUN = """
+import sys
+from test_experiments import SCALES, TINY, reproduce
+import graspmoduli as gm
+SCALES["quick"] = TINY
+if len(sys.argv) > 2:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
+try:
+    reproduce(["fig5", "fig7", "fig10", "fig11"], out=sys.argv[1], threads=2)
+except gm.GraspModuliError as error:
+    print(error)
+    sys.exit(2)
+"""
+
+
+def start(folder, *limits):
+    environment = {**os.environ, "PYTHONPATH": os.path.dirname(__file__)}  # noqa: PTH120
+    command = [sys.executable, "-c", RUN, str(folder), *limits]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    begin = time.perf_counter()
+    assert start(folder).wait() == 0
+    return (folder / "results.json").read_bytes(), time.perf_counter() - begin
+
+
+def test_a_run_that_is_killed_goes_on(undisturbed, tmp_path):
+    wanted, seconds = undisturbed
+    moments = random.Random(7)
+    kills = rounds = interrupted = 0
+    while kills < 20:
+        rounds += 1
+        folder = tmp_path / str(rounds)
+        while True:
+            process = start(folder)
+            try:
+                process.wait(moments.uniform(0.2, 1.0) * seconds)
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGKILL)
+                process.wait()
+                kills += 1
+                pieces = 0
+                if (folder / "pieces.sqlite").exists():
+                    with sqlite3.connect(folder / "pieces.sqlite") as connection:
+                        tables = connection.execute("SELECT name FROM sqlite_master").fetchall()
+                        if ("pieces",) in tables:
+                            query = "SELECT count(*) FROM pieces"
+                            (pieces,) = connection.execute(query).fetchone()
+                interrupted += 0 < pieces < 64
+                continue
+            assert process.returncode == 0
+            break
+        assert (folder / "results.json").read_bytes() == wanted
+        assert not list(folder.glob(".*"))
+    # Some of the kills came in the middle of the work.
+    assert interrupted >= 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX's")
+def test_a_full_disk_is_one_sentence_and_loses_nothing(undisturbed, tmp_path):
+    process = start(tmp_path, "20000")
+    output, _ = process.communicate()
+    assert process.returncode == 2
+    assert output.startswith("out")
+    assert output.count("\n") == 1
+    assert not (tmp_path / "results.json").exists()
+    assert start(tmp_path).wait() == 0
+    assert (tmp_path / "results.json").read_bytes() == undisturbed[0]
+
+
+class TestCommand:
+    def run(self, *arguments):
+        command = [sys.executable, "-m", "graspmoduli", "reproduce", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    def test_writes_a_report(self, tmp_path):
+        result = self.run("fig12", "fig2", "--out", str(tmp_path))
+        assert result.returncode == 0, result.stderr
+        assert "models e–l" in result.stdout
+        assert (tmp_path / "report.html").exists()
+        again = self.run("fig12", "fig2", "--out", str(tmp_path))
+        assert "fig12: going on, 8 of 8 pieces are there" in again.stderr
+
+    @pytest.mark.parametrize(
+        ("arguments", "sentence"),
+        [
+            (["fig99"], f"name must be one of {', '.join(NAMES)}, got 'fig99'"),
+            (["--scale", "giant"], "scale must be one of quick, paper, got 'giant'"),
+            (["--threads", "many"], "threads must be a whole number, got 'many'"),
+        ],
+    )
+    def test_errors_are_one_line(self, arguments, sentence, tmp_path):
+        result = self.run(*arguments, "--out", str(tmp_path))
+        assert result.returncode == 2
+        assert result.stderr == f"graspmoduli: {sentence}\n"
