@@ -52,6 +52,7 @@ class Store:
         except (OSError, sqlite3.Error) as error:
             raise self._unusable(error) from None
         if found != wanted:
+            self._connection.close()
             raise GraspModuliError(
                 f"out must be a folder of the same configuration, got {folder} with another one "
                 f"({_difference(json.loads(found), configuration)}); give another folder"
