@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-extras lint format reproduce bench clean prerequisites
+.PHONY: help demo test test-extras test-browser lint format reproduce bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -19,13 +19,22 @@ demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
 
 test: $(READY) ## Every test, Rust and Python
 	cargo test --release --quiet --package graspmoduli
-	$(BIN)/pytest --numprocesses auto --ignore tests/extras \
-	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py python tests
+	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser \
+	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py \
+	    --ignore python/graspmoduli/viewer.py python tests
 
 test-extras: $(READY) ## The tests of torch, jax and dask: installs them, several gigabytes
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
 	    --editable '.[torch,jax,dask]'
 	$(BIN)/pytest tests/extras
+
+test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwright and, if root, chromium
+	@command -v chromium >/dev/null || { test "$$(id -u)" = 0 && command -v apt-get >/dev/null && \
+	    apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || \
+	    { echo "the browser tests need chromium: install it (Debian: apt install chromium)"; exit 1; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
+	    --editable '.[view]' 'playwright>=1.50'
+	$(BIN)/pytest tests/browser
 
 lint: $(READY) ## Formatting, clippy, ruff and types
 	cargo fmt --check

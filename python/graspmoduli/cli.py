@@ -1,4 +1,4 @@
-"""The command line: ``graspmoduli grasp OBJECT``, ``graspmoduli reproduce``."""
+"""The command line: ``graspmoduli grasp OBJECT``, ``reproduce``, ``view``."""
 
 from __future__ import annotations
 
@@ -196,6 +196,70 @@ def reproduce(
     if table.row_count:
         output.print(table)
     print(f"wrote {out / 'report.html'}, {out / 'report.md'} and {out / 'results.json'}")
+
+
+@app.command()
+def view(
+    thing: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[OBJECT]", help="Mesh or point cloud; the space of model shapes if not given."
+        ),
+    ] = None,
+    port: Annotated[str, typer.Option(metavar="P", help="Port on loopback; 0 takes any.")] = "8080",
+    html: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the scene as one page that needs no server."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw it here without a screen.")
+    ] = None,
+    friction: Annotated[str, typer.Option(help="Coulomb friction coefficient μ > 0.")] = "1.0",
+    edges: Annotated[str, typer.Option(help="Edges l of the friction cones, at least 3.")] = "8",
+) -> None:
+    """Look at OBJECT, its grasps and their friction cones in a browser, and move them."""
+    mu, l = _number("friction", friction, float), _number("edges", edges, int)
+    _arrays.cone(mu, l)
+    at = _arrays.count("port", _number("port", port, int), 0)
+    if at > 65535:
+        raise GraspModuliError(f"port must be at most 65535, got {at}")
+    saved = html is not None or picture is not None
+    if saved and thing is None:
+        raise GraspModuliError("OBJECT must be given for html and picture, got none")
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        raise GraspModuliError(
+            f"picture must be a file of a known format ({' '.join(PICTURES)}), got {picture.name}"
+        )
+    from . import viewer
+
+    if not saved:
+        # A busy port is found out before the work.
+        viewer.free_port(at)
+    with contextlib.ExitStack() as outputs:
+        page = outputs.enter_context(replacing(html)) if html else None
+        image = outputs.enter_context(replacing(picture)) if picture else None
+        server = None
+        if thing is None:
+            server = viewer.serve_shapes(at)
+        else:
+            with _progress() as step, _warnings():
+                found = _find(thing, mu, l, 5, 0, step)
+                if page is not None:
+                    best = found[2][0] if found[2] else None
+                    page.write_text(viewer.page_of(*found[:2], best, mu, l))
+                if image is not None:
+                    from .plotting import plot_grasps
+
+                    figure = plot_grasps(*found, friction=mu, edges=l, title=Path(thing).name)
+                    figure.savefig(image)
+            if not saved:
+                server = viewer.serve_object(at, *found, mu, l, Path(thing).name)
+    for path in (html, picture):
+        if path is not None:
+            print(f"wrote {path}")
+    if server is not None:
+        print(f"open http://127.0.0.1:{server.get_port()} in a browser; Ctrl-C ends", flush=True)
+        server.sleep_forever()
 
 
 def _find(
