@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-extras test-browser lint format reproduce bench clean prerequisites
+.PHONY: help demo test test-extras test-browser lint format reproduce docs bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -50,6 +50,11 @@ format: $(READY) ## Format the sources
 
 reproduce: $(READY) ## The paper's experiments at the quick scale: report in out/reproduction/
 	$(BIN)/graspmoduli reproduce --out out/reproduction
+
+docs: $(READY) ## The documentation site, without a network, in out/site/
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
+	    'mkdocs-material>=9.6' 'mkdocstrings[python]>=0.29'
+	$(BIN)/mkdocs build --quiet
 
 bench: $(READY) ## Speed, side by side with SciPy in one run
 	$(BIN)/python benchmarks/bench.py --markdown docs/benchmarks.md

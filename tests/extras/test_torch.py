@@ -5,8 +5,9 @@ import pytest
 import torch
 
 import graspmoduli as gm
-from conftest import uniform_grasps
+from conftest import ROOT, uniform_grasps
 from graspmoduli.torch import quality
+from test_docs import run_blocks
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +77,7 @@ def test_ascent_on_a_sphere_improves_a_grasp():
 def test_wrong_input_says_what_was_wanted():
     with pytest.raises(gm.GraspModuliError, match="friction must be"):
         quality(torch.eye(3), -torch.eye(3), torch.zeros(3), friction=-1.0)
+
+
+def test_the_tutorial_runs():
+    run_blocks(ROOT / "docs" / "gradient.md")
