@@ -1,6 +1,13 @@
-"""Exact grasp quality of three contacts, what it means, and its gradient."""
+"""Exact grasp quality of three contacts, what it means, and its gradient; with a picture.
+
+python examples/01_quality.py [PICTURE]
+"""
+
+import sys
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import graspmoduli as gm
 
@@ -29,3 +36,18 @@ gradient = gm.quality_gradient(worst, normals, center)
 step = 0.05 * gradient.contacts / np.linalg.norm(gradient.contacts)
 print(f"the worst: Q_8 = {gradient.value:.4f}; moved by 5 % of the radius along the gradient, "
       f"{gm.quality(worst + step, normals, center):.4f}")  # fmt: skip
+
+# How far friction carries, and how much the polygon of a cone loses against round ones.
+frictions = np.linspace(0.05, 1.5, 60)
+figure = Figure(figsize=(6.4, 3.8), dpi=120, layout="constrained")
+axes = figure.add_subplot(xlabel="friction coefficient μ", ylabel="grasp quality", xlim=(0, 1.5))
+for edges, style in ((4, ":"), (8, "-"), (32, "--")):
+    values = [gm.quality(contacts / 0.03, normals, center, friction=mu, edges=edges)
+              for mu in frictions]  # fmt: skip
+    axes.plot(frictions, values, style, label=f"{edges} cone edges")
+axes.set_title("three fingers around a can, lengths over its radius")
+axes.legend(frameon=False)
+picture = Path(sys.argv[1] if len(sys.argv) > 1 else "out/quality.png")
+picture.parent.mkdir(exist_ok=True, parents=True)
+figure.savefig(picture)
+print(f"wrote {picture}")

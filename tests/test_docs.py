@@ -40,3 +40,4 @@ def test_examples_run(path, tmp_path):
     )
     assert result.returncode == 0, result.stderr
     assert len(path.read_text().splitlines()) < 80
+    assert list(tmp_path.rglob("*.png"))

@@ -207,6 +207,9 @@ def view(
         ),
     ] = None,
     port: Annotated[str, typer.Option(metavar="P", help="Port on loopback; 0 takes any.")] = "8080",
+    shapes: Annotated[
+        bool, typer.Option("--shapes", help="The space of shapes, with OBJECT as a corner.")
+    ] = False,
     html: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the scene as one page that needs no server."),
@@ -230,6 +233,10 @@ def view(
         raise GraspModuliError(
             f"picture must be a file of a known format ({' '.join(PICTURES)}), got {picture.name}"
         )
+    if shapes and thing is None:
+        raise GraspModuliError(
+            "OBJECT must be given for shapes, got none; without it they are shown"
+        )
     from . import viewer
 
     if not saved:
@@ -252,7 +259,11 @@ def view(
 
                     figure = plot_grasps(*found, friction=mu, edges=l, title=Path(thing).name)
                     figure.savefig(image)
-            if not saved:
+            if shapes and not saved:
+                fit = found[1]
+                unit = (1.0 / fit.length_scale) * fit.surface
+                server = viewer.serve_shapes(at, {Path(thing).name: unit})
+            elif not saved:
                 server = viewer.serve_object(at, *found, mu, l, Path(thing).name)
     for path in (html, picture):
         if path is not None:

@@ -264,6 +264,22 @@ def test_a_saved_page_opens_without_a_server(browser, tmp_path):
     window.page.close()
 
 
+def test_the_command_serves_an_own_object_among_the_shapes(browser):
+    command = [sys.executable, "-m", "graspmoduli", "view", str(OBJECT), "--shapes", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        line = process.stdout.readline()
+        assert line.startswith("open http://127.0.0.1:")
+        window = Window(browser, line.split()[1])
+        window.page.wait_for_selector("[data-quality]", timeout=60_000)
+        values = [field.input_value() for field in window.page.locator("input").all()]
+        assert "yogurt_bottle.ply" in values
+        assert window.quality() > 0.0
+        assert window.errors == []
+        window.page.close()
+        process.terminate()
+
+
 def run(*arguments):
     command = [sys.executable, "-m", "graspmoduli", "view", *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
