@@ -124,7 +124,7 @@ def test_unit_and_pose_do_not_matter(scale):
     mesh.apply_transform(pose)
     mesh.apply_scale(scale)
     moved = gm.fit(mesh)
-    axis = pose[:3, :3] @ plain.pose[:3, 2]
+    axis = np.asarray(pose)[:3, :3] @ plain.pose[:3, 2]
     assert abs(axis @ moved.pose[:3, 2]) > np.cos(np.radians(0.5))
     assert moved.residual.rms == pytest.approx(scale * plain.residual.rms, rel=0.5)
     best = moved.synthesize()[0]
