@@ -44,6 +44,7 @@ fn batch<'a>(
         points: vectors(contacts.as_slice()?),
         normals: vectors(normals.as_slice()?),
         centers: vectors(center_of_mass.as_slice()?),
+        frictions: &[],
     })
 }
 
@@ -91,7 +92,8 @@ fn quality<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, norm(each), &mut out));
+    py.detach(|| batch.quality(&cone, norm(each), &mut out))
+        .map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -110,7 +112,8 @@ fn quality_gradient<'py>(
     let width = Gradient::width(contacts.as_array().shape()[1]);
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len() * width];
-    py.detach(|| batch.gradient(&cone, &mut out));
+    py.detach(|| batch.gradient(&cone, &mut out))
+        .map_err(raise)?;
     PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
@@ -130,7 +133,8 @@ fn quality_at_least<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![false; batch.centers.len()];
-    py.detach(|| batch.is_at_least(&cone, threshold, &mut out));
+    py.detach(|| batch.is_at_least(&cone, threshold, &mut out))
+        .map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -149,13 +153,14 @@ fn extreme_quality(
 ) -> PyResult<Option<(usize, f64)>> {
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
-    Ok(py.detach(|| {
+    py.detach(|| {
         if largest {
             batch.largest(&cone)
         } else {
             batch.smallest(&cone)
         }
-    }))
+    })
+    .map_err(raise)
 }
 
 /// Bounds of the quality with circular cones of n grasps.
@@ -171,7 +176,8 @@ fn circular_quality<'py>(
     let cone = cone(friction, 3, 0.0)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![[0.0; 2]; batch.centers.len()];
-    py.detach(|| batch.circular(&cone, tolerance, &mut out));
+    py.detach(|| batch.circular(&cone, tolerance, &mut out))
+        .map_err(raise)?;
     table(py, out)
 }
 
@@ -369,7 +375,7 @@ fn best_subsets<'py>(
             }
         };
         let center = center_of_mass.into();
-        search::best_subsets(&contacts, center, &cone, size, top, threads, report)
+        search::best_subsets(&contacts, &[], center, &cone, size, top, threads, report)
     });
     match (result, failure) {
         (Ok(ranked), _) => Ok(ranked.into_iter().map(|r| (r.indices, r.quality)).collect()),
