@@ -25,6 +25,7 @@
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
 //! | [`domain`] | random grasps in the domain D(1), and near each other |
 //! | [`transfer`] | carrying grasps from one surface to another |
+//! | [`math`] | sine, cosine and the like, the same on every processor |
 //! | [`error`] | what can be wrong with a request |
 //!
 //! No global state: threads and random numbers are arguments.
@@ -34,6 +35,7 @@ pub mod contact;
 pub mod distance;
 pub mod domain;
 pub mod error;
+pub mod math;
 mod nnls;
 pub mod quality;
 pub mod sampling;

@@ -183,7 +183,7 @@ impl Plane {
             let edges = cone.edges.iter().map(|[x, y]| [friction * x, friction * y]);
             self.edge_tables[i] = padded(edges, cone.len(), 1.0);
             let height = -friction * cone.inner;
-            let length = height.hypot(1.0);
+            let length = (1.0 + height * height).sqrt();
             let rays = cone.rays.iter().map(|[x, y]| [x / length, y / length]);
             self.ray_tables[i] = padded(rays, cone.len(), height / length);
         }
