@@ -2,6 +2,7 @@
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
 mod domain;
+mod math;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
@@ -545,6 +546,8 @@ fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferre
 mod _core {
     #[pymodule_export]
     use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
+    #[pymodule_export]
+    use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
     #[pymodule_export]
     use super::{
         GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,

@@ -18,6 +18,7 @@
 //! | [`contact`] | contact frames, friction cones |
 //! | [`quality`] | exact $Q_l$ and its gradient |
 //! | [`surface`] | spline surfaces: points, normals, integrals, convex-cone operations |
+//! | [`interpolation`] | splines through given values, banded systems |
 //! | [`sampling`] | area-uniform points |
 //! | [`search`] | the best of all subsets of contacts |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
@@ -35,6 +36,7 @@ pub mod contact;
 pub mod distance;
 pub mod domain;
 pub mod error;
+pub mod interpolation;
 pub mod math;
 mod nnls;
 pub mod quality;

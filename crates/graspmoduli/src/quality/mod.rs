@@ -5,6 +5,7 @@
 
 mod apex_ray_face;
 mod gradient;
+mod instructions;
 mod lanes;
 mod plane;
 mod polytope;
@@ -16,6 +17,7 @@ mod velocity;
 mod wrenches;
 
 pub use gradient::Gradient;
+pub use instructions::instructions_name;
 pub(crate) use polytope::LARGEST_ERROR;
 pub use r6::Twist;
 pub use wrenches::Norm;

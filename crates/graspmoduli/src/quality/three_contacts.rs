@@ -16,6 +16,7 @@
 //! not clear beyond rounding is left to the expanding polytope.
 
 use super::apex_ray_face::Bounds;
+use super::instructions::instructions;
 use super::lanes::{dot, greatest};
 use super::plane::{Closure, LANES, Lanes, Plane, Table, at, zeros};
 use super::r6::Twist;
@@ -112,7 +113,7 @@ impl Kernel {
     pub fn new(cone: &FrictionCone) -> Self {
         let plane = Plane::new(cone);
         let edges = cone.len();
-        let arch = Arch::new();
+        let arch = instructions();
         Self {
             arch,
             narrow: narrow(arch),
