@@ -277,6 +277,134 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(cases(1500))]
+
+    #[test]
+    fn the_order_of_the_contacts_does_not_change_a_bit(
+        (contacts, center) in hand(tame), cone in cones(), turns in 0..6usize, torsion in 0.0..0.3_f64
+    ) {
+        let mut other = contacts.clone();
+        other.rotate_left(turns % contacts.len());
+        let last = other.len() - 1;
+        other.swap(0, last);
+        for cone in [cone.clone(), cone.soft(torsion).unwrap()] {
+            let mut evaluator = Evaluator::new(&cone);
+            let mut bits = |contacts: &[Contact]| [
+                evaluator.quality(contacts, center),
+                evaluator.quality_of_each(contacts, center),
+                evaluator.circular(contacts, center, 0.1).0,
+                evaluator.gradient(contacts, center).value,
+            ].map(f64::to_bits);
+            prop_assert_eq!(bits(&contacts), bits(&other));
+        }
+    }
+
+    #[test]
+    fn friction_of_each_contact_is_that_of_all_where_it_is_the_same(
+        (contacts, center) in grasp(tame), mu in 0.1..2.0_f64, l in 3..40usize
+    ) {
+        let mut one = Evaluator::new(&FrictionCone::new(mu, l).unwrap());
+        let mut each = Evaluator::new(&FrictionCone::each(&[mu; 3], l).unwrap());
+        prop_assert_eq!(one.quality(&contacts, center), each.quality(&contacts, center));
+        prop_assert_eq!(one.gradient(&contacts, center), each.gradient(&contacts, center));
+    }
+
+    #[test]
+    fn friction_goes_with_its_contact(
+        (contacts, center) in grasp(tame), frictions in [0.1..2.0_f64, 0.1..2.0, 0.1..2.0], l in 3..12usize
+    ) {
+        let cone = FrictionCone::each(&frictions, l).unwrap();
+        let mut evaluator = Evaluator::new(&cone);
+        let quality = evaluator.quality(&contacts, center);
+        // Among wrenches of all sorts the polytope sees no contacts: the same hull with each
+        // contact's edges as contacts without friction.
+        let edges: Vec<Contact> = contacts.iter().enumerate().flat_map(|(i, contact)| {
+            let (frame, cone) = (Frame::new(contact.normal), cone.clone());
+            (0..l).map(move |j| Contact { point: contact.point, normal: cone.edge(i, &frame, j) })
+        }).collect();
+        let hull = Evaluator::new(&FrictionCone::new(0.0, 3).unwrap()).quality(&edges, center);
+        prop_assert!((quality - hull).abs() < 1e-12, "{} {}", quality, hull);
+        // And in another order of both.
+        let swapped = FrictionCone::each(&[frictions[2], frictions[0], frictions[1]], l).unwrap();
+        let other = [contacts[2], contacts[0], contacts[1]];
+        prop_assert_eq!(quality, Evaluator::new(&swapped).quality(&other, center));
+        let gradient = evaluator.gradient(&contacts, center);
+        prop_assert_eq!(gradient.value, quality);
+        if quality > 0.01 {
+            let h = 1e-7;
+            for i in 0..3 {
+                let mut slope = DVec3::ZERO;
+                for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                    let mut moved = |sign: f64| {
+                        let mut moved = contacts;
+                        moved[i].point += axis * (sign * h);
+                        evaluator.quality(&moved, center)
+                    };
+                    let (right, left) = (moved(1.0) - quality, quality - moved(-1.0));
+                    // Where the two differ there is a kink.
+                    if (right - left).abs() < 1e-5 * h {
+                        slope += axis * ((right + left) / (2.0 * h));
+                        prop_assert!((gradient.contacts[i].dot(axis) - slope.dot(axis)).abs() < 1e-5);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn thresholds_are_decided_in_q((contacts, center) in grasp(tame), cone in cones()) {
+        let mut evaluator = Evaluator::new(&cone);
+        let quality = evaluator.quality(&contacts, center);
+        if quality > 0.0 {
+            prop_assert!(evaluator.is_at_least(&contacts, center, quality));
+            prop_assert!(!evaluator.is_at_least(&contacts, center, quality.next_up()));
+        }
+    }
+
+    #[test]
+    fn long_levers_flat_triangles_and_many_edges_cost_no_digits(
+        (contacts, center) in grasp(tame), far in 0..8i32, flat in 0..9i32, many in any::<bool>()
+    ) {
+        // The same hull, once as three contacts and once as four.
+        let mut contacts = contacts;
+        let line = contacts[1].point - contacts[0].point;
+        let middle = contacts[0].point + line * 0.3;
+        contacts[2].point = middle + (contacts[2].point - middle) * 10f64.powi(-flat);
+        let center = center * 10f64.powi(far);
+        let cone = FrictionCone::new(1.0, if many { 40 } else { 8 }).unwrap();
+        let mut evaluator = Evaluator::new(&cone);
+        let three = evaluator.quality(&contacts, center);
+        let four = evaluator.quality(&[contacts[0], contacts[1], contacts[2], contacts[0]], center);
+        prop_assert!((three - four).abs() <= 1e-9 * four + 1e-13, "{three:e} {four:e}");
+        prop_assert!(evaluator.take_unconverged().is_none());
+    }
+}
+
+#[test]
+fn batches_refuse_parts_that_do_not_fit() {
+    let cone = FrictionCone::new(1.0, 8).unwrap();
+    let (points, normals) = ([[0.0; 3]; 5], [[0.0, 0.0, 1.0]; 6]);
+    let batch = Batch {
+        points: &points,
+        normals: &normals,
+        centers: &[[0.0; 3]; 2],
+        frictions: &[],
+    };
+    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 2]).is_err());
+    let batch = Batch {
+        points: &normals,
+        ..batch
+    };
+    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 3]).is_err());
+    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 2]).is_ok());
+    let batch = Batch {
+        frictions: &[1.0; 3],
+        ..batch
+    };
+    assert!(batch.smallest(&cone).is_err());
+}
+
 #[test]
 fn batches_agree_with_single_grasps() {
     let cone = FrictionCone::new(1.0, 8).unwrap();

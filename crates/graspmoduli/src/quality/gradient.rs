@@ -111,8 +111,8 @@ pub(super) fn of_vertex(
     if !within {
         let mut all = Wrenches::new();
         let found = nearest && {
-            all.set(contacts, &order, center, cone, super::Norm::Sum);
-            foot_point(&all, &direction, value, cone, &mut shares)
+            all.set(contacts, &order, cone, super::Norm::Sum);
+            foot_point(&all, &direction, value, center, cone, &mut shares)
         };
         // Weights that left the cone are no element of the generalised gradient.
         if !found && (nearest || weights.is_none()) {
@@ -129,17 +129,12 @@ pub(super) fn foot_point(
     wrenches: &Wrenches,
     direction: &Twist,
     value: f64,
+    center: DVec3,
     cone: &FrictionCone,
     shares: &mut [Share],
 ) -> bool {
-    let scale = wrenches.scale;
-    let twist: Twist = std::array::from_fn(|i| {
-        if i < 3 {
-            direction[i]
-        } else {
-            direction[i] * scale
-        }
-    });
+    let reference = wrenches.reference;
+    let twist = reference.of_twist(*direction, center);
     let (mut columns, mut active) = (Vec::new(), Vec::new());
     for (index, wrench) in wrenches.all.iter().enumerate() {
         if dot(wrench, &twist) >= value * (1.0 - ON_THE_FACET) {
@@ -147,14 +142,7 @@ pub(super) fn foot_point(
             active.push(wrenches.origin(index));
         }
     }
-    let foot: Twist = std::array::from_fn(|i| {
-        value
-            * if i < 3 {
-                direction[i]
-            } else {
-                direction[i] / scale
-            }
-    });
+    let foot = reference.of_wrench(direction.map(|x| x * value), center);
     let weights = nonnegative(&columns, foot);
     let total: f64 = weights.iter().sum();
     if (total - 1.0).abs() > 1e-6 {

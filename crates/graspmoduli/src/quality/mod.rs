@@ -25,12 +25,13 @@ pub use wrenches::Norm;
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use glam::DVec3;
-use polytope::{Distance, Polytope};
+use plane::Three;
+use polytope::{Distance, Metric, Polytope};
 use rayon::prelude::*;
 use std::cmp::Ordering as CompareOrdering;
 use std::sync::atomic::{AtomicU64, Ordering};
 use three_contacts::Kernel;
-use wrenches::{Circular, Wrenches};
+use wrenches::{Circular, Reference, Wrenches};
 
 /// Beyond so many edges per cone the expanding polytope is faster than the closed form.
 const MOST_EDGES: usize = 36;
@@ -99,7 +100,7 @@ impl Evaluator {
     pub fn quality(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
         self.evaluations += 1;
         if let Some((three, _)) = self.closed_form(contacts)
-            && let Ok(longest) = self.kernel.longest(&three, center_of_mass)
+            && let Ok(longest) = self.kernel.longest(three, center_of_mass)
         {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
@@ -133,7 +134,7 @@ impl Evaluator {
         threshold: f64,
     ) -> f64 {
         if let Some((three, _)) = self.closed_form(contacts)
-            && let Ok(longest) = self.kernel.longest_up_to(&three, center_of_mass, threshold)
+            && let Ok(longest) = self.kernel.longest_up_to(three, center_of_mass, threshold)
         {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
@@ -150,7 +151,7 @@ impl Evaluator {
         threshold: f64,
     ) -> Option<Weakest> {
         if let Some((three, _)) = self.closed_form(contacts)
-            && let Ok(longest) = self.kernel.longest_up_to(&three, center_of_mass, threshold)
+            && let Ok(longest) = self.kernel.longest_up_to(three, center_of_mass, threshold)
         {
             let vertex = longest?;
             let quality = vertex.quality();
@@ -161,7 +162,11 @@ impl Evaluator {
         }
         let below = |_, upper| upper < threshold;
         let distance = self.distance(contacts, center_of_mass, Norm::Sum, below)?;
-        Some(self.unscaled(&distance))
+        let metric = Metric::new(self.wrenches.reference, center_of_mass);
+        Some(Weakest {
+            quality: self.value(&distance),
+            direction: metric.direction(&distance.direction),
+        })
     }
 
     /// Q_l if it is below `threshold`, else `threshold`.
@@ -173,7 +178,7 @@ impl Evaluator {
         threshold: f64,
     ) -> f64 {
         let quality = if let Some((three, _)) = self.closed_form(contacts)
-            && let Ok(longest) = self.kernel.longest_above(&three, center_of_mass, threshold)
+            && let Ok(longest) = self.kernel.longest_above(three, center_of_mass, threshold)
         {
             longest.map_or(0.0, |vertex| {
                 vertex.map_or(threshold, |vertex| vertex.quality())
@@ -200,7 +205,7 @@ impl Evaluator {
         self.evaluations += 1;
         row.fill(0.0);
         if let Some((three, order)) = self.closed_form(contacts)
-            && let Ok(longest) = self.kernel.longest(&three, center)
+            && let Ok(longest) = self.kernel.longest(three, center)
         {
             if let Some(vertex) = longest
                 && !gradient::of_vertex(&vertex, order, contacts, center, &self.cone, true, row)
@@ -227,7 +232,7 @@ impl Evaluator {
         if quality > 0.0 {
             let mut shares = vec![Default::default(); contacts.len()];
             let (wrenches, cone) = (&self.wrenches, &self.cone);
-            if gradient::foot_point(wrenches, &direction, quality, cone, &mut shares) {
+            if gradient::foot_point(wrenches, &direction, quality, center, cone, &mut shares) {
                 gradient::differentiate(&direction, quality, contacts, center, &shares, row);
             }
         }
@@ -236,22 +241,22 @@ impl Evaluator {
     /// The quality by the expanding polytope, whatever the number of contacts, with the direction in
     /// which the grasp is weakest.
     pub fn weakest(&mut self, contacts: &[Contact], center: DVec3, norm: Norm) -> Weakest {
-        self.set_wrenches(contacts, center, norm);
-        let scale = self.wrenches.scale;
-        if !usable(scale) {
-            // All contacts at the centre of mass, or infinitely far: there is no torque.
+        self.set_wrenches(contacts, norm);
+        if self.wrenches.reference.is_point() {
+            // All contacts in one place: no force works along a turn about it.
+            let v = (self.wrenches.reference.point - center).cross(DVec3::X);
             return Weakest {
                 quality: 0.0,
-                direction: [0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+                direction: r6::unit(&[v.x, v.y, v.z, 1.0, 0.0, 0.0]).0,
             };
         }
-        let distance = self.polytope.distance(&self.wrenches, scale, never);
-        let mut weakest = self.unscaled(&distance);
-        weakest.quality = self.value(&distance);
-        if self.too_few(contacts) {
-            weakest.quality = 0.0;
+        let metric = Metric::new(self.wrenches.reference, center);
+        let distance = self.polytope.distance(&self.wrenches, metric, never);
+        let quality = self.value(&distance);
+        Weakest {
+            quality: if self.too_few(contacts) { 0.0 } else { quality },
+            direction: metric.direction(&distance.direction),
         }
-        weakest
     }
 
     /// Lower and upper bound of the quality with exact circular cones, which meet to `tolerance`
@@ -263,27 +268,33 @@ impl Evaluator {
         tolerance: f64,
     ) -> (f64, f64) {
         self.evaluations += 1;
-        let scale = wrenches::scale(contacts, center_of_mass, 0.0);
-        if self.too_few(contacts) || !usable(scale) {
+        if self.too_few(contacts) {
             return (0.0, 0.0);
         }
         self.sort(contacts);
+        let reference = Reference::new(contacts, &self.order, 0.0);
+        if reference.is_point() {
+            return (0.0, 0.0);
+        }
         let hull = Circular {
             contacts,
             order: &self.order,
-            center: center_of_mass,
             cone: &self.cone,
-            scale,
+            reference,
         };
         let met = |lower, upper| upper - lower <= tolerance * upper;
-        let distance = self.polytope.distance(&hull, scale, met);
+        let metric = Metric::new(reference, center_of_mass);
+        let distance = self.polytope.distance(&hull, metric, met);
+        if !distance.upper.is_finite() {
+            self.unconverged = Some([distance.lower, distance.upper]);
+        }
         (distance.lower, distance.upper)
     }
 
     /// The contacts of a grasp that has a closed form in their order, and the order; sets the
     /// kernel's friction.
     #[inline]
-    fn closed_form(&mut self, contacts: &[Contact]) -> Option<([Contact; 3], [usize; 3])> {
+    fn closed_form<'a>(&mut self, contacts: &'a [Contact]) -> Option<(Three<'a>, [usize; 3])> {
         let three: &[Contact; 3] = contacts.try_into().ok()?;
         if self.cone.torsion() > 0.0 || self.cone.len() > MOST_EDGES {
             return None;
@@ -298,7 +309,7 @@ impl Evaluator {
             let frictions = order.map(|i| self.cone.friction(i));
             self.kernel.set_frictions(&self.cone, frictions);
         }
-        Some((order.map(|i| three[i]), order))
+        Some((order.map(|i| &three[i]), order))
     }
 
     /// Two hard contacts cannot resist a twist about their line, one of any kind cannot pull, and
@@ -324,10 +335,9 @@ impl Evaluator {
         });
     }
 
-    fn set_wrenches(&mut self, contacts: &[Contact], center: DVec3, norm: Norm) {
+    fn set_wrenches(&mut self, contacts: &[Contact], norm: Norm) {
         self.sort(contacts);
-        self.wrenches
-            .set(contacts, &self.order, center, &self.cone, norm);
+        self.wrenches.set(contacts, &self.order, &self.cone, norm);
     }
 
     /// By the expanding polytope; `None` where Q = 0 for want of contacts or of lever arms.
@@ -338,12 +348,12 @@ impl Evaluator {
         norm: Norm,
         enough: impl FnMut(f64, f64) -> bool,
     ) -> Option<Distance> {
-        self.set_wrenches(contacts, center, norm);
-        let scale = self.wrenches.scale;
-        if self.too_few(contacts) || !usable(scale) {
+        self.set_wrenches(contacts, norm);
+        if self.too_few(contacts) || self.wrenches.reference.is_point() {
             return None;
         }
-        Some(self.polytope.distance(&self.wrenches, scale, enough))
+        let metric = Metric::new(self.wrenches.reference, center);
+        Some(self.polytope.distance(&self.wrenches, metric, enough))
     }
 
     /// The value by the expanding polytope.
@@ -369,22 +379,6 @@ impl Evaluator {
         distance.lower
     }
 
-    /// The distance with its direction in the object frame.
-    fn unscaled(&self, distance: &Distance) -> Weakest {
-        let scale = self.wrenches.scale;
-        let [a, b, c, d, e, f] = distance.direction;
-        // Both scalings are the same direction; this one does not overflow.
-        let direction = if scale >= 1.0 {
-            [a, b, c, d / scale, e / scale, f / scale]
-        } else {
-            [a * scale, b * scale, c * scale, d, e, f]
-        };
-        Weakest {
-            quality: distance.upper,
-            direction: r6::unit(&direction).0,
-        }
-    }
-
     /// Gradients of the distances to the facets within `distance` of the origin, at most `most`,
     /// the nearest first and always among them; `None` where Q_l = 0.
     pub(crate) fn facets_within(
@@ -398,7 +392,7 @@ impl Evaluator {
         let mut row = [0.0; 22];
         let mut gradients = Vec::new();
         if let Some((three, order)) = self.closed_form(contacts)
-            && let Ok(vertices) = self.kernel.within(&three, center_of_mass, distance, most)
+            && let Ok(vertices) = self.kernel.within(three, center_of_mass, distance, most)
         {
             let cone = &self.cone;
             for vertex in vertices? {
@@ -436,11 +430,6 @@ const BY_COMPARISON: [[usize; 3]; 8] = [
     [2, 0, 1],
     [2, 1, 0],
 ];
-
-/// Lever arms that are numbers, and not all 0.
-fn usable(scale: f64) -> bool {
-    scale > 0.0 && scale.is_finite()
-}
 
 fn never(_: f64, _: f64) -> bool {
     false

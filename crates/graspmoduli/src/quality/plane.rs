@@ -63,6 +63,9 @@ const IN_PLANE: f64 = 1e-7;
 /// Friction for which wedges are neither all of a half-plane nor nothing to rounding.
 const USUAL_FRICTION: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
 
+/// The contacts of a grasp, in the order in which they are looked at.
+pub(super) type Three<'a> = [&'a Contact; 3];
+
 /// Is a grasp force closure?
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Closure {
@@ -193,7 +196,7 @@ impl Plane {
     /// Is the grasp force closure? Sets up the plane of the contacts and their cones' edges in it,
     /// which is left undefined if the answer is no.
     #[inline(always)]
-    pub fn closure(&mut self, contacts: &[Contact; 3]) -> Closure {
+    pub fn closure(&mut self, contacts: Three) -> Closure {
         match self.set_up(contacts) {
             Closure::Yes => self.force_closure(),
             other => other,
@@ -202,7 +205,7 @@ impl Plane {
 
     /// `Yes` if there is a plane and each cone may reach to both of its sides.
     #[inline(always)]
-    fn set_up(&mut self, contacts: &[Contact; 3]) -> Closure {
+    fn set_up(&mut self, contacts: Three) -> Closure {
         let origin = contacts[0].point;
         let (first, second) = (contacts[1].point - origin, contacts[2].point - origin);
         let third = second - first;
@@ -255,7 +258,7 @@ impl Plane {
 
     /// Sets up what the kernel needs beyond the planar test.
     #[inline(always)]
-    pub fn set_up_rays(&mut self, contacts: &[Contact; 3], center_of_mass: DVec3) {
+    pub fn set_up_rays(&mut self, contacts: Three, center_of_mass: DVec3) {
         self.center = self
             .basis
             .transpose()

@@ -12,10 +12,13 @@
 //! Points in one plane, such as the edges of a cone, would give facets of more than six points.
 //! So a point p counts as p/(1 + ε_p) with fixed tiny different ε_p, which moves the answer inward
 //! by less than that; the value reported is that of the points as they are. Where a sign cannot
-//! be told from rounding all the same, the expansion begins anew with other, larger ε_p.
+//! be told from rounding all the same, the expansion begins anew in coordinates in which the hull
+//! is not flat, and then with other, larger ε_p.
 
-use super::r6::{Twist, dot, solve};
-use super::surround::{BOUNDARY, Position, Simplex, surround};
+use super::r6::{Twist, dot, solve, unit};
+use super::surround::{BOUNDARY, Basis, Position, Simplex, surround};
+use super::wrenches::Reference;
+use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -51,7 +54,7 @@ impl Levels {
 }
 
 /// The perturbations ε that are tried, one after the other.
-const EPSILONS: [f64; 9] = [1e-9, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
+const EPSILONS: [f64; 6] = [1e-9, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
 /// The largest error of a value, in units of forces and of torques over the longest lever arm,
 /// that a perturbation may bring with it; a value with a larger one has not converged.
 pub(crate) const LARGEST_ERROR: f64 = 1e-8;
@@ -68,9 +71,9 @@ const MOST_FACETS: usize = 1 << 22;
 pub(super) struct Distance {
     /// Not above the distance.
     pub lower: f64,
-    /// Not below it: h(v) for the unit vector `direction`.
+    /// Not below it: h(x) for the x of length 1 that is `direction`.
     pub upper: f64,
-    /// v.
+    /// x, in the hull's coordinates.
     pub direction: Twist,
     /// Is `upper` the distance, but for rounding? Or else, did the caller have enough?
     pub converged: bool,
@@ -105,42 +108,90 @@ impl Distance {
     }
 }
 
-/// Lengths of twists whose last three coordinates were multiplied by the scale by which wrenches'
-/// were divided: ‖x‖² = ‖v‖² + ‖ω‖²/scale².
+/// Lengths of twists about the centre of mass, of which the hull's coordinates are about another
+/// point and in another unit of length.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Metric {
-    linear: f64,
-    angular: f64,
-    /// What the square root of the two is divided by, so that neither overflows.
+    /// From the centre of mass to the point that torques of the hull are about, and what they
+    /// were divided by: ‖x‖² = ‖v − ω/scale × shift‖² + ‖ω/scale‖².
+    shift: DVec3,
+    scale: f64,
+    /// Both terms are multiplied by this, so that neither overflows.
     unit: f64,
 }
 
 impl Metric {
-    pub fn new(scale: f64) -> Self {
-        if scale >= 1.0 {
-            Self {
-                linear: 1.0,
-                angular: (1.0 / scale) / scale,
-                unit: 1.0,
-            }
-        } else {
-            Self {
-                linear: scale * scale,
-                angular: 1.0,
-                unit: scale,
-            }
+    pub fn new(reference: Reference, center_of_mass: DVec3) -> Self {
+        Self {
+            shift: reference.point - center_of_mass,
+            scale: reference.scale,
+            unit: reference.scale.min(1.0),
         }
+    }
+
+    /// Can lengths be computed without overflow?
+    fn is_tame(&self) -> bool {
+        let reach = self.shift.abs().max_element();
+        let tame = |length: f64| (1e-140..1e140).contains(&length);
+        tame(self.scale) && reach < 1e140 && reach / self.scale < 1e140 && self.shift.is_finite()
+    }
+
+    /// v and ω about the centre of mass, times the unit.
+    #[inline(always)]
+    fn about_center(self, [a, b, c, d, e, f]: &Twist) -> [DVec3; 2] {
+        let angular = DVec3::new(*d, *e, *f) * (self.unit / self.scale);
+        let linear = DVec3::new(*a, *b, *c) * self.unit - angular.cross(self.shift);
+        [linear, angular]
     }
 
     #[inline(always)]
     fn square(self, x: &Twist) -> f64 {
-        self.linear * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-            + self.angular * (x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+        let [linear, angular] = self.about_center(x);
+        linear.length_squared() + angular.length_squared()
     }
 
     #[inline(always)]
     fn length(self, x: &Twist) -> f64 {
         self.square(x).sqrt() / self.unit
+    }
+
+    /// The unit twist about the centre of mass.
+    pub fn direction(self, x: &Twist) -> Twist {
+        let [v, w] = self.about_center(x);
+        unit(&[v.x, v.y, v.z, w.x, w.y, w.z]).0
+    }
+}
+
+/// Coordinates in which an expansion takes place.
+trait Coordinates {
+    /// A polar vertex in the hull's own coordinates, in which lengths are measured.
+    fn own(&self, x: &Twist) -> Twist;
+    /// A point of the hull in these coordinates.
+    fn point(&self, point: &Twist) -> Twist;
+}
+
+/// The hull's own.
+struct Own;
+
+impl Coordinates for Own {
+    #[inline(always)]
+    fn own(&self, x: &Twist) -> Twist {
+        *x
+    }
+
+    #[inline(always)]
+    fn point(&self, point: &Twist) -> Twist {
+        *point
+    }
+}
+
+impl Coordinates for Basis {
+    fn own(&self, x: &Twist) -> Twist {
+        self.from_axes(x)
+    }
+
+    fn point(&self, point: &Twist) -> Twist {
+        self.to_axes(point)
     }
 }
 
@@ -194,32 +245,53 @@ pub(super) struct Polytope {
 /// Rounding made the facets contradict each other, or a sign could not be told.
 struct Rounding;
 
+/// What an expansion is asked, and what it knows so far.
+struct Expansion<'a, S, E> {
+    support: &'a S,
+    metric: Metric,
+    levels: Levels,
+    best: &'a mut Distance,
+    enough: &'a mut E,
+}
+
 impl Polytope {
-    /// The distance from the origin to the boundary of a hull, by the metric that counts the last
-    /// three coordinates `scale` times (the hull should be about as long in these as in the first
-    /// three). `enough(lower, upper)` may end the search early.
+    /// The distance from the origin to the boundary of a hull by a metric. `enough(lower, upper)`
+    /// may end the search early.
     ///
     /// The distance is 0 where the origin is not in the interior, or only by [`BOUNDARY`].
     pub fn distance(
         &mut self,
         support: &impl Support,
-        scale: f64,
+        metric: Metric,
         mut enough: impl FnMut(f64, f64) -> bool,
     ) -> Distance {
-        let metric = Metric::new(scale);
         let mut best = Distance::UNKNOWN;
+        if !metric.is_tame() {
+            return best;
+        }
         for (attempt, epsilon) in (0..).zip(EPSILONS) {
             let levels = Levels {
                 epsilon,
                 salt: attempt << 48,
             };
-            let simplex = match surround(support, levels) {
+            let basis = match surround(support, levels) {
                 Some(Position::Separated(x)) => return Distance::zero(x),
-                Some(Position::Surrounded(simplex)) => simplex,
+                Some(Position::Surrounded(basis)) => basis,
                 None => continue,
             };
-            let expanded = self.expand(support, simplex, metric, levels, &mut best, &mut enough);
-            if expanded.is_ok() {
+            let mut expansion = Expansion {
+                support,
+                metric,
+                levels,
+                best: &mut best,
+                enough: &mut enough,
+            };
+            let plain = self.expand(basis.simplex(), &Own, &mut expansion);
+            if plain.is_ok()
+                || self
+                    .expand(basis.simplex_of_axes(), &basis, &mut expansion)
+                    .is_ok()
+            {
                 return best;
             }
         }
@@ -228,16 +300,23 @@ impl Polytope {
     }
 
     /// Narrows the bounds until they meet, or are enough for the caller, or too many facets.
-    fn expand(
+    fn expand<S: Support, E: FnMut(f64, f64) -> bool>(
         &mut self,
-        support: &impl Support,
         simplex: Simplex,
-        metric: Metric,
-        levels: Levels,
-        best: &mut Distance,
-        enough: &mut impl FnMut(f64, f64) -> bool,
+        coordinates: &impl Coordinates,
+        expansion: &mut Expansion<'_, S, E>,
     ) -> Result<(), Rounding> {
-        self.start(simplex, metric);
+        let Expansion {
+            support,
+            metric,
+            levels,
+            best,
+            enough,
+        } = expansion;
+        let metric = *metric;
+        // Bounds from above stay right whatever rounding did before, those from below may not.
+        best.lower = 0.0;
+        self.start(simplex, metric, coordinates);
         let epsilon = levels.epsilon;
         let mut made = 0;
         while let Some(entry) = self.queue.pop() {
@@ -245,23 +324,26 @@ impl Polytope {
             if !facet.alive {
                 continue;
             }
-            let x = facet.x;
+            let x = coordinates.own(&facet.x);
             let real = dot(&x, &x).sqrt();
             best.lower = best.lower.max(1.0 / metric.length(&x)).min(best.upper);
             let (point, key) = support.farthest(&x);
             let height = dot(&x, &point);
             if height <= BOUNDARY * real {
-                *best = Distance::zero(x.map(|c| c / real));
+                **best = Distance::zero(x.map(|c| c / real));
                 return Ok(());
             }
             best.take(height, &x, metric);
             let level = levels.of(key);
-            if height - level <= (ROUNDING * real).max(0.01 * epsilon) {
+            let point = coordinates.point(&point);
+            let over = dot(&facet.x, &point) - level;
+            let rounding = ROUNDING * dot(&facet.x, &facet.x).sqrt();
+            if over <= rounding.max(0.01 * epsilon) {
                 // What the perturbation may have hidden.
                 if epsilon / real > LARGEST_ERROR {
                     return Err(Rounding);
                 }
-                self.polish(support, entry, epsilon, metric, best);
+                self.polish(*support, entry, epsilon, metric, coordinates, best);
                 best.converged = true;
                 return Ok(());
             }
@@ -269,14 +351,14 @@ impl Polytope {
             if best.converged || made > MOST_FACETS {
                 return Ok(());
             }
-            made += self.insert(entry.facet, point, level, metric)?;
+            made += self.insert(entry.facet, point, level, metric, coordinates)?;
         }
         Err(Rounding)
     }
 
     /// The facets of a simplex about the origin: facet k lies opposite to point k, so it is also
     /// the neighbour across from it.
-    fn start(&mut self, simplex: Simplex, metric: Metric) {
+    fn start(&mut self, simplex: Simplex, metric: Metric, coordinates: &impl Coordinates) {
         self.points.clear();
         self.points.extend(simplex.points);
         self.hashes.clear();
@@ -292,7 +374,7 @@ impl Polytope {
                 alive: true,
             });
             self.queue.push(Entry {
-                square: metric.square(&x),
+                square: metric.square(&coordinates.own(&x)),
                 facet: opposite,
             });
         }
@@ -305,6 +387,7 @@ impl Polytope {
         point: Twist,
         level: f64,
         metric: Metric,
+        coordinates: &impl Coordinates,
     ) -> Result<usize, Rounding> {
         let new_point = self.points.len() as u32;
         self.points.push(point);
@@ -353,7 +436,7 @@ impl Polytope {
                 });
                 self.created.push(created);
                 self.queue.push(Entry {
-                    square: metric.square(&x),
+                    square: metric.square(&coordinates.own(&x)),
                     facet: created,
                 });
             }
@@ -410,6 +493,7 @@ impl Polytope {
         nearest: Entry,
         epsilon: f64,
         metric: Metric,
+        coordinates: &impl Coordinates,
         best: &mut Distance,
     ) {
         const MOST: usize = 64;
@@ -422,6 +506,7 @@ impl Polytope {
                 looked_at += 1;
                 let rows = facet.points.map(|p| self.points[p as usize]);
                 if let Some(x) = solve(rows, [1.0; 6]) {
+                    let x = coordinates.own(&x);
                     let (point, _) = support.farthest(&x);
                     best.take(dot(&x, &point), &x, metric);
                 }

@@ -15,8 +15,9 @@ use super::polytope::{Levels, Support};
 use super::r6::{Twist, add, dot, unit};
 
 /// A hull that reaches no farther than this beyond a plane through the origin, in units of forces
-/// and of torques over the longest lever arm, does not contain the origin in its interior: it is
-/// on the boundary. All that this library says of force closure rests on this number.
+/// and of torques about the contacts' centroid over the longest distance from it, does not contain
+/// the origin in its interior: it is on the boundary. All that this library says of force closure
+/// rests on this number.
 pub(super) const BOUNDARY: f64 = 1e-12;
 /// Steps before the method counts as failed; it needs about a dozen.
 const MOST_STEPS: usize = 500;
@@ -25,18 +26,18 @@ const PIVOT: f64 = 1e-11;
 
 /// Where the origin is.
 pub(super) enum Position {
-    /// In the interior of this simplex of points of the hull.
-    Surrounded(Simplex),
+    /// In the interior of the hull: of the simplex of six of its points and the one inside.
+    Surrounded(Basis),
     /// Not in the interior of the hull: a unit x with ⟨x, w⟩ ≤ [`BOUNDARY`] for all its points.
     Separated(Twist),
 }
 
-/// Seven points about the origin, and its facets by their polar vertices.
+/// Seven points about the origin, and the facets of their simplex by their polar vertices: the x
+/// with ⟨x, p⟩ = level of p for all points p but that of the same index.
 #[derive(Debug, Clone)]
 pub(super) struct Simplex {
     /// The last one is the point in the interior of the hull.
     pub points: [Twist; 7],
-    /// The x with ⟨x, p⟩ = level of p for all points p but that of the same index.
     pub facets: [Twist; 7],
 }
 
@@ -59,7 +60,9 @@ pub(super) fn surround(support: &impl Support, levels: Levels) -> Option<Positio
                 return Some(Position::Separated(direction));
             }
         } else if height <= level * (1.0 + 1e-14 * dot(&x, &x).sqrt()) {
-            return basis.simplex(&x, &inside).map(Position::Surrounded);
+            basis.facet = x;
+            let sound = basis.weights.iter().all(|&weight| weight > 0.0);
+            return sound.then_some(Position::Surrounded(basis));
         }
         basis.enter(point, level)?;
     }
@@ -74,11 +77,14 @@ struct Column {
 }
 
 /// Six columns, the inverse of their matrix, and the weights λ ≥ 0 with Σ λ_k w_k = d.
-struct Basis {
+#[derive(Debug, Clone)]
+pub(super) struct Basis {
     columns: [Column; 6],
     inverse: [Twist; 6],
     weights: [f64; 6],
     artificial: usize,
+    /// The x with ⟨x, w_k⟩ = level of w_k, at the end.
+    facet: Twist,
 }
 
 impl Basis {
@@ -97,6 +103,7 @@ impl Basis {
             inverse: std::array::from_fn(axis),
             weights: d.map(f64::abs),
             artificial: 6,
+            facet: [0.0; 6],
         }
     }
 
@@ -143,18 +150,55 @@ impl Basis {
         Some(())
     }
 
-    /// The columns and the point inside; x is the facet through the columns.
-    fn simplex(&self, x: &Twist, inside: &Twist) -> Option<Simplex> {
-        // A facet through the point inside turns about the ridge without column k: along row k of
-        // the inverse, in which the point inside lies −λ_k deep.
-        let gap = 1.0 - dot(x, inside);
-        let mut points = [*inside; 7];
-        let mut facets = [*x; 7];
-        for k in 0..6 {
-            points[k] = self.columns[k].point;
-            facets[k] = add(x, -gap / self.weights[k], &self.inverse[k]);
+    /// The simplex of the columns and the point inside, −d.
+    pub fn simplex(&self) -> Simplex {
+        let points = self.columns.map(|column| column.point);
+        let mut inside = [0.0; 6];
+        for (point, weight) in points.iter().zip(self.weights) {
+            inside = add(&inside, -weight, point);
         }
-        let sound = facets.iter().flatten().all(|c| c.is_finite());
-        (sound && self.weights.iter().all(|&w| w > 0.0)).then_some(Simplex { points, facets })
+        self.about(points, inside, self.facet, self.inverse)
+    }
+
+    /// The same simplex in coordinates in which the columns are the axes, w ↦ W⁻¹w: there the
+    /// hull is about as long in every direction, however flat it is.
+    pub fn simplex_of_axes(&self) -> Simplex {
+        let axes = std::array::from_fn(|k| std::array::from_fn(|i| f64::from(i == k)));
+        let levels = self.columns.map(|column| column.level.unwrap_or(1.0));
+        self.about(axes, self.weights.map(|weight| -weight), levels, axes)
+    }
+
+    /// A facet through the point inside turns about the ridge without column k: along row k of the
+    /// inverse, in which the point inside lies −λ_k deep.
+    fn about(
+        &self,
+        columns: [Twist; 6],
+        inside: Twist,
+        facet: Twist,
+        inverse: [Twist; 6],
+    ) -> Simplex {
+        let gap = 1.0 - dot(&facet, &inside);
+        let (mut points, mut facets) = ([inside; 7], [facet; 7]);
+        for k in 0..6 {
+            points[k] = columns[k];
+            facets[k] = add(&facet, -gap / self.weights[k], &inverse[k]);
+        }
+        Simplex { points, facets }
+    }
+
+    /// A point of the hull in the coordinates of [`Basis::simplex_of_axes`].
+    #[inline]
+    pub fn to_axes(&self, point: &Twist) -> Twist {
+        self.inverse.map(|row| dot(&row, point))
+    }
+
+    /// A polar vertex in those coordinates, in the hull's own.
+    #[inline]
+    pub fn from_axes(&self, x: &Twist) -> Twist {
+        let mut own = [0.0; 6];
+        for (row, share) in self.inverse.iter().zip(x) {
+            own = add(&own, *share, row);
+        }
+        own
     }
 }

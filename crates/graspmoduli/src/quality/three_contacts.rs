@@ -18,10 +18,10 @@
 use super::apex_ray_face::Bounds;
 use super::instructions::instructions;
 use super::lanes::{dot, greatest};
-use super::plane::{Closure, LANES, Lanes, Plane, Table, at, zeros};
+use super::plane::{Closure, LANES, Lanes, Plane, Table, Three, at, zeros};
 use super::r6::Twist;
 use super::ray_ray_ray::Forms;
-use crate::contact::{Contact, FrictionCone};
+use crate::contact::FrictionCone;
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::ControlFlow;
@@ -135,11 +135,7 @@ impl Kernel {
 
     /// The longest admissible twist, or `None` where the grasp is not force closure (Q = 0).
     #[inline]
-    pub fn longest(
-        &mut self,
-        contacts: &[Contact; 3],
-        center: DVec3,
-    ) -> Result<Option<Vertex>, Unclear> {
+    pub fn longest(&mut self, contacts: Three, center: DVec3) -> Result<Option<Vertex>, Unclear> {
         let closed = self.ask(contacts, center, Question::Longest)?;
         Ok(closed.then(|| self.found[0]))
     }
@@ -149,7 +145,7 @@ impl Kernel {
     #[inline]
     pub fn longest_up_to(
         &mut self,
-        contacts: &[Contact; 3],
+        contacts: Three,
         center: DVec3,
         threshold: f64,
     ) -> Result<Option<Vertex>, Unclear> {
@@ -162,7 +158,7 @@ impl Kernel {
     #[inline]
     pub fn longest_above(
         &mut self,
-        contacts: &[Contact; 3],
+        contacts: Three,
         center: DVec3,
         threshold: f64,
     ) -> Result<Option<Option<Vertex>>, Unclear> {
@@ -177,7 +173,7 @@ impl Kernel {
     /// closure.
     pub fn within(
         &mut self,
-        contacts: &[Contact; 3],
+        contacts: Three,
         center: DVec3,
         distance: f64,
         most: usize,
@@ -205,12 +201,7 @@ impl Kernel {
 
     /// Fills `found`; false where the grasp is not force closure.
     #[inline]
-    fn ask(
-        &mut self,
-        contacts: &[Contact; 3],
-        center: DVec3,
-        question: Question,
-    ) -> Result<bool, Unclear> {
+    fn ask(&mut self, contacts: Three, center: DVec3, question: Question) -> Result<bool, Unclear> {
         self.found.clear();
         let plane = &mut self.plane;
         match self.narrow.dispatch(Closed { plane, contacts }) {
@@ -308,7 +299,7 @@ fn narrow(arch: Arch) -> Arch {
 /// Is the grasp force closure? Compiled for each instruction set and chosen at run time.
 struct Closed<'a> {
     plane: &'a mut Plane,
-    contacts: &'a [Contact; 3],
+    contacts: Three<'a>,
 }
 
 impl WithSimd for Closed<'_> {
@@ -323,7 +314,7 @@ impl WithSimd for Closed<'_> {
 /// The kernel for grasps that are, likewise.
 struct Ask<'a> {
     kernel: &'a mut Kernel,
-    contacts: &'a [Contact; 3],
+    contacts: Three<'a>,
     center: DVec3,
     question: Question,
 }
@@ -358,6 +349,7 @@ pub(super) fn ray(plane: &Plane, contact: usize, index: usize) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Contact;
 
     /// Uniform in the ball of radius 1 and on the sphere.
     fn grasps(count: usize) -> Vec<([Contact; 3], DVec3)> {
@@ -403,9 +395,9 @@ mod tests {
             let mut portable = kernels.next().unwrap();
             let mut others: Vec<Kernel> = kernels.collect();
             for (contacts, center) in grasps(2000) {
-                let wanted = portable.longest(&contacts, center);
+                let wanted = portable.longest(contacts.each_ref(), center);
                 for kernel in &mut others {
-                    assert_eq!(kernel.longest(&contacts, center), wanted);
+                    assert_eq!(kernel.longest(contacts.each_ref(), center), wanted);
                 }
             }
         }

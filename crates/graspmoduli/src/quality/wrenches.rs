@@ -14,29 +14,71 @@ pub enum Norm {
     Each,
 }
 
-/// Force and torque as one vector, the torque divided by a length.
-fn wrench(contact: &Contact, center: DVec3, force: DVec3, spin: f64, scale: f64) -> Twist {
-    let torque = ((contact.point - center).cross(force) + contact.normal * spin) / scale;
-    [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+/// What torques are about and divided by while a hull is expanded: the centroid of the contacts and
+/// their longest distance from it, or the torsional coefficient if that is longer. Whether a grasp
+/// is force closure does not depend on the centre of mass, and so the hull about the centroid,
+/// which is about as long in torques as in forces, can tell best.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reference {
+    pub point: DVec3,
+    pub scale: f64,
 }
 
-/// The longest lever arm or torsional coefficient: divided by it, torques are about as long as
-/// forces.
-pub(super) fn scale(contacts: &[Contact], center: DVec3, torsion: f64) -> f64 {
-    contacts
-        .iter()
-        .map(|contact| contact.point.distance(center))
-        .fold(torsion, f64::max)
+impl Reference {
+    /// Of contacts in the order in which they are looked at.
+    pub fn new(contacts: &[Contact], order: &[usize], torsion: f64) -> Self {
+        let share = 1.0 / order.len() as f64;
+        let point = order
+            .iter()
+            .fold(DVec3::ZERO, |sum, &i| sum + contacts[i].point * share);
+        let scale = order
+            .iter()
+            .map(|&i| contacts[i].point.distance(point))
+            // Unlike `f64::max` this does not pass over what is not a number.
+            .fold(torsion, |a, b| if a >= b { a } else { b });
+        Self { point, scale }
+    }
+
+    /// Are all contacts in one place, and hard?
+    pub fn is_point(self) -> bool {
+        self.scale == 0.0
+    }
+
+    /// Force and torque as one vector.
+    #[inline(always)]
+    fn wrench(self, contact: &Contact, force: DVec3, spin: f64) -> Twist {
+        let lever = contact.point - self.point;
+        let torque = (lever.cross(force) + contact.normal * spin) / self.scale;
+        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+    }
+
+    /// A wrench about the centre of mass in these coordinates.
+    pub fn of_wrench(self, [a, b, c, d, e, f]: Twist, center_of_mass: DVec3) -> Twist {
+        let force = DVec3::new(a, b, c);
+        let torque = DVec3::new(d, e, f) - (self.point - center_of_mass).cross(force);
+        let torque = torque / self.scale;
+        [a, b, c, torque.x, torque.y, torque.z]
+    }
+
+    /// A twist about the centre of mass in these coordinates, in which it does the same work.
+    pub fn of_twist(self, [a, b, c, d, e, f]: Twist, center_of_mass: DVec3) -> Twist {
+        let angular = DVec3::new(d, e, f);
+        let linear = DVec3::new(a, b, c) + angular.cross(self.point - center_of_mass);
+        let angular = angular * self.scale;
+        [
+            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+        ]
+    }
 }
 
-/// The wrenches of a grasp with polygonal cones, torques divided by `scale`.
+/// The wrenches of a grasp with polygonal cones.
 #[derive(Debug, Clone)]
 pub(super) struct Wrenches {
     /// Contact after contact, in an order of their own.
     pub all: Vec<Twist>,
     order: Vec<usize>,
     per_contact: usize,
-    pub scale: f64,
+    pub reference: Reference,
     norm: Norm,
 }
 
@@ -46,21 +88,17 @@ impl Wrenches {
             all: Vec::new(),
             order: Vec::new(),
             per_contact: 1,
-            scale: 1.0,
+            reference: Reference {
+                point: DVec3::ZERO,
+                scale: 1.0,
+            },
             norm: Norm::Sum,
         }
     }
 
     /// `order` is the order in which the contacts' wrenches are looked at.
-    pub fn set(
-        &mut self,
-        contacts: &[Contact],
-        order: &[usize],
-        center: DVec3,
-        cone: &FrictionCone,
-        norm: Norm,
-    ) {
-        self.scale = scale(contacts, center, cone.torsion());
+    pub fn set(&mut self, contacts: &[Contact], order: &[usize], cone: &FrictionCone, norm: Norm) {
+        self.reference = Reference::new(contacts, order, cone.torsion());
         self.per_contact = cone.generators();
         self.norm = norm;
         self.order.clear();
@@ -71,7 +109,7 @@ impl Wrenches {
             let frame = Frame::new(contact.normal);
             self.all.extend((0..self.per_contact).map(|k| {
                 let (local, spin) = cone.generator(i, k);
-                wrench(contact, center, frame.turn(local), spin, self.scale)
+                self.reference.wrench(contact, frame.turn(local), spin)
             }));
         }
     }
@@ -143,22 +181,21 @@ pub(super) struct Circular<'a> {
     pub contacts: &'a [Contact],
     /// The order in which contacts are looked at.
     pub order: &'a [usize],
-    pub center: DVec3,
     pub cone: &'a FrictionCone,
-    pub scale: f64,
+    pub reference: Reference,
 }
 
 impl Support for Circular<'_> {
     fn farthest(&self, x: &Twist) -> (Twist, u64) {
         let mut best = ([0.0; 6], f64::NEG_INFINITY);
         let linear = DVec3::new(x[0], x[1], x[2]);
-        let angular = DVec3::new(x[3], x[4], x[5]) / self.scale;
+        let angular = DVec3::new(x[3], x[4], x[5]) / self.reference.scale;
         for &i in self.order {
             let contact = &self.contacts[i];
-            let velocity = linear + angular.cross(contact.point - self.center);
+            let velocity = linear + angular.cross(contact.point - self.reference.point);
             let friction = self.cone.friction(i);
             let force = contact.normal + sideways(velocity, contact.normal) * friction;
-            let wrench = wrench(contact, self.center, force, 0.0, self.scale);
+            let wrench = self.reference.wrench(contact, force, 0.0);
             let height = dot(x, &wrench);
             if height > best.1 {
                 best = (wrench, height);
@@ -180,7 +217,7 @@ impl Support for Circular<'_> {
             (0..3).map(move |k| {
                 let force = self.cone.edge(i, &frame, k * self.cone.len() / 3);
                 let weight = levels.spread(3 * number + k as u64);
-                (weight, wrench(contact, self.center, force, 0.0, self.scale))
+                (weight, self.reference.wrench(contact, force, 0.0))
             })
         }))
     }
