@@ -2,38 +2,47 @@
 
 The paper's "most dominant axis", made robust: candidates are refined and judged by how well the
 outer wall about each is such a surface.
+
+As in :mod:`.walls`, nothing here calls BLAS or LAPACK, and where numbers tie a fixed order decides,
+not their last bits.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import Floats
+from ._core import cos, sin, solve_banded
 from .reading import Object
 from .walls import CLOSE, Axis, coarse_hits, outermost, regress
+
+#: Numbers of order 1 this close are equal but for rounding.
+TIE = 1e-9
 
 
 def same_axis(thing: Object, one: Axis, other: Axis) -> bool:
     """Do two axes differ by less than 0.3 degrees and 0.3 % of the object's size?"""
-    between = one.local(other.origin)
-    turned = abs(one.rotation[:, 2] @ other.rotation[:, 2])
-    apart = float(np.hypot(between[0], between[1]))
+    between = one.local(other.origin[None])[0]
+    turned = abs((one.rotation[:, 2] * other.rotation[:, 2]).sum())
+    apart = sqrt(between[0] ** 2 + between[1] ** 2)
     return bool(turned > 1.0 - 1.4e-5) and apart < 3e-3 * thing.size
 
 
 def candidate_axes(thing: Object) -> list[Axis]:
     """The coordinate axes, the principal axes, and the axis of revolution."""
     centered = thing.samples - thing.samples.mean(axis=0)
-    directions = [*np.eye(3), *np.linalg.svd(centered, full_matrices=False)[2]]
+    directions = [*np.eye(3), *principal(_products(centered, centered))[1].T[::-1]]
     axes: list[Axis] = []
     for direction in directions:
-        if any(abs(direction @ axis.rotation[:, 2]) > 0.9998 for axis in axes):
+        if any(abs((direction * axis.rotation[:, 2]).sum()) > 0.9998 for axis in axes):
             continue
         rotation = _frame(direction)
-        planar = thing.samples @ rotation[:, :2]
+        planar = Axis(rotation, np.zeros(3)).local(thing.samples)[:, :2]
         low, high = np.percentile(planar, [1.0, 99.0], axis=0)
-        axes.append(Axis(rotation, rotation[:, :2] @ ((low + high) / 2)))
+        axes.append(Axis(rotation, _along(rotation[:, :2], (low + high) / 2)))
     revolution = _axis_of_revolution(thing)
     if revolution is not None:
         axes.append(revolution)
@@ -54,20 +63,24 @@ def _axis_of_revolution(thing: Object) -> Axis | None:
     direction = moment = np.zeros(3)
     for _ in range(15):
         weighted = thing.sample_normals * weights[:, None]
-        nn, nm = weighted.T @ thing.sample_normals, weighted.T @ moments
-        mm = (moments * weights[:, None]).T @ moments
-        # Eliminating the moment leaves a 3 × 3 problem for the direction.
-        inverse = np.linalg.pinv(nn, rcond=1e-6)
-        values, vectors = np.linalg.eigh(mm - nm.T @ inverse @ nm)
-        if not np.isfinite(values).all():
+        nn, nm = _products(weighted, thing.sample_normals), _products(weighted, moments)
+        mm = _products(moments * weights[:, None], moments)
+        if not (np.isfinite(nn).all() and np.isfinite(nm).all() and np.isfinite(mm).all()):
             return None
-        direction = vectors[:, 0]
-        moment = -inverse @ nm @ direction
-        error = np.abs(thing.sample_normals @ moment + moments @ direction)
+        # Eliminating the moment leaves a 3 × 3 problem for the direction.
+        values, vectors = principal(nn)
+        kept = values > 1e-6 * values[2]
+        inverse = _products(
+            (vectors * np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)).T, vectors.T
+        )
+        solved = _products(inverse, nm)
+        direction = principal(mm - _products(nm, solved))[1][:, 0]
+        moment = -_along(solved, direction)
+        error = np.abs(_along(thing.sample_normals, moment) + _along(moments, direction))
         scale = max(1.5 * float(np.median(error)), 1e-6)
         weights = 1.0 / (1.0 + (error / scale) ** 2)
     foot = np.cross(direction, moment)
-    if np.linalg.norm(foot) > 1.0:
+    if (foot * foot).sum() > 1.0:
         # The axis misses the object.
         return None
     return Axis(_frame(direction), middle + thing.size * foot)
@@ -75,11 +88,12 @@ def _axis_of_revolution(thing: Object) -> Axis | None:
 
 def _frame(direction: Floats) -> Floats:
     """A rotation whose third column is the direction, in the sense that points up or forward."""
-    axis = direction / np.linalg.norm(direction)
-    largest = int(np.argmax(np.abs(axis)))
-    axis = axis * np.sign(axis[largest])
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side /= np.linalg.norm(side)
+    axis = direction / np.sqrt((direction * direction).sum())
+    # The first among equals, rounding aside.
+    sizes = np.abs(axis)
+    axis = axis * np.sign(axis[int(np.argmax(sizes > sizes.max() - TIE))])
+    side = np.cross(axis, np.eye(3)[int(np.argmax(sizes < sizes.min() + TIE))])
+    side /= np.sqrt((side * side).sum())
     return np.stack([side, np.cross(axis, side), axis], axis=1)
 
 
@@ -93,7 +107,7 @@ def refined(thing: Object, axis: Axis) -> Axis:
         wall = outermost(hits, grid)
         height, angle, radius = hits.height[wall], hits.angle[wall], hits.radius[wall]
         row = grid.row(height)
-        directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        directions = np.stack([cos(angle), sin(angle)], axis=1)
         lever = (height - (grid.low + grid.high) / 2) / thing.size
         columns = np.concatenate([directions, directions * lever[:, None]], axis=1)
         step = np.zeros(4)
@@ -101,23 +115,70 @@ def refined(thing: Object, axis: Axis) -> Axis:
         for _ in range(5):
             design = np.stack([_centred(column, row, weights) for column in columns.T], axis=1)
             target = _centred(radius, row, weights)
-            root = np.sqrt(weights)[:, None]
+            weighted = design * weights[:, None]
             # A little damping: a short arc says little about the shift across it.
-            stacked = np.concatenate([design * root, 1e-3 * len(radius) ** 0.5 * np.eye(4)])
-            right = np.concatenate([target * root[:, 0], np.zeros(4)])
-            step = np.linalg.lstsq(stacked, right, rcond=None)[0]
-            error = np.abs(target - design @ step)
+            normal = _products(weighted, design) + 1e-6 * len(radius) * np.eye(4)
+            band = np.stack([np.roll(row, 3 - i) for i, row in enumerate(normal)])
+            step = solve_banded(band, _products(weighted, target[:, None])[:, 0])
+            error = np.abs(target - _along(design, step))
             scale = max(3.0 * float(np.median(error)), 1e-4 * thing.size)
             weights = 1.0 / (1.0 + (error / scale) ** 2)
         limit = 0.2 * thing.size
         shift = np.clip(step[:2], -limit, limit)
         tilt = np.clip(step[2:] / thing.size, -0.3, 0.3)
         middle = axis.origin + axis.rotation[:, 2] * (grid.low + grid.high) / 2
-        direction = axis.rotation @ np.array([*tilt, 1.0])
-        axis = Axis(_frame(direction), middle + axis.rotation[:, :2] @ shift)
+        direction = _along(axis.rotation, np.array([*tilt, 1.0]))
+        axis = Axis(_frame(direction), middle + _along(axis.rotation[:, :2], shift))
         if np.abs(shift).max() < 1e-4 * thing.size and np.abs(tilt).max() < 1e-4:
             break
     return axis
+
+
+def _along(rows: Floats, vector: Floats) -> Floats:
+    """Σ_k rows[:, k] · vector[k]."""
+    return sum((rows[:, k] * vector[k] for k in range(1, len(vector))), rows[:, 0] * vector[0])
+
+
+def _products(one: Floats, other: Floats) -> Floats:
+    """Σ_i one[i, :] ⊗ other[i, :]."""
+    return (one[:, :, None] * other[:, None, :]).sum(axis=0)
+
+
+def principal(matrix: Floats) -> tuple[Floats, Floats]:
+    """Ascending eigenvalues and, as columns, eigenvectors of a symmetric 3 × 3 matrix.
+
+    By Jacobi's rotations from the coordinate axes: where eigenvalues are equal but for rounding,
+    as those of a cube are, the vectors stay at these axes.
+    """
+    a, vectors = matrix.tolist(), np.eye(3)
+    scale = float(np.abs(matrix).max())
+    for _ in range(12):
+        for i, k in ((0, 1), (0, 2), (1, 2)):
+            if abs(a[i][k]) <= 1e-15 * scale:
+                continue
+            if abs(a[i][k]) <= TIE * scale and abs(a[i][i] - a[k][k]) <= TIE * scale:
+                continue
+            slope = (a[k][k] - a[i][i]) / (2.0 * a[i][k])
+            tangent = (1.0 if slope >= 0.0 else -1.0) / (abs(slope) + sqrt(1.0 + slope * slope))
+            cosine = 1.0 / sqrt(1.0 + tangent * tangent)
+            sine = tangent * cosine
+            for row in a:
+                row[i], row[k] = cosine * row[i] - sine * row[k], sine * row[i] + cosine * row[k]
+            a[i], a[k] = (
+                [cosine * x - sine * y for x, y in zip(a[i], a[k], strict=True)],
+                [sine * x + cosine * y for x, y in zip(a[i], a[k], strict=True)],
+            )
+            vectors[:, [i, k]] = np.stack(
+                [
+                    cosine * vectors[:, i] - sine * vectors[:, k],
+                    sine * vectors[:, i] + cosine * vectors[:, k],
+                ],
+                axis=1,
+            )
+    values = np.array([a[j][j] for j in range(3)])
+    # In the order of the axes among equals.
+    order = sorted(range(3), key=lambda j: (round(values[j] / (TIE * scale or 1.0)), j))
+    return values[order], vectors[:, order]
 
 
 def _centred(values: Floats, row: NDArray[np.int64], weights: Floats) -> Floats:
@@ -142,7 +203,7 @@ def score(thing: Object, axis: Axis) -> float:
     pinched = float((mean < 0.25 * mean.max()).mean())
     # What lies within the wall is hidden unless it closes the ends.
     local = axis.local(thing.samples)
-    depth = shape.at_points(local, grid) - np.hypot(local[:, 0], local[:, 1])
+    depth = shape.at_points(local, grid) - np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2)
     missed = float((depth < -CLOSE * thing.size).mean())
     # A scan from one side sees half of the cells about the true axis, fewer about many others.
     unseen = max(0.0, 0.6 - seen)

@@ -27,6 +27,8 @@ from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regr
 
 #: More unexplained than this is refused.
 MOST_UNEXPLAINED = 0.4
+#: Axes whose scores, numbers of order 1, are this close are equally good.
+TIE = 1e-6
 #: More unexplained than this is worth a warning.
 WORTH_A_WARNING = 0.005
 
@@ -237,7 +239,9 @@ def fit_object(thing: Object, progress: Callable[[int, int], object] | None = No
                 scored.append((score(thing, axis), axis))
         if progress is not None:
             progress(done + 1, len(candidates))
-    lowest, axis = min(scored, key=lambda entry: entry[0])
+    lowest = min(value for value, _ in scored)
+    # The first among equals: a symmetric object must not get another axis by a last bit.
+    axis = next(axis for value, axis in scored if value <= lowest + TIE)
     if not np.isfinite(lowest):
         raise GraspModuliError(
             "object must have an outer wall around some axis, got too little of one"

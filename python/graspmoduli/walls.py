@@ -2,6 +2,9 @@
 
 The regression is that of penalised splines (P. Eilers, B. Marx, Flexible smoothing with B-splines
 and penalties, 1996) with robust weights.
+
+Nothing here calls BLAS or LAPACK: their threads starve on a busy machine, and their last bits
+differ between processors, as do NumPy's sines; those of the core do neither.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import Floats
-from ._core import GraspModuliError
+from ._core import GraspModuliError, arctan2, cos, sin, solve_banded
 from .reading import Object
 from .surfaces import Surface, clamped_knots
 
@@ -47,7 +50,8 @@ class Axis(NamedTuple):
 
     def local(self, points: Floats) -> Floats:
         """Points in this frame. Shape (n, 3)."""
-        return (points - self.origin) @ self.rotation
+        moved = points - self.origin
+        return sum(moved[:, k, None] * self.rotation[k] for k in range(3))
 
 
 class Hits(NamedTuple):
@@ -139,16 +143,16 @@ def _mesh_hits(local: Floats, faces: NDArray[np.int64], grid: Grid) -> Hits:
     start, end = ends
     # Rays between the segment's ends, the short way round.
     turn = 2 * np.pi / grid.columns
-    from_angle = np.arctan2(start[:, 1], start[:, 0])
+    from_angle = arctan2(start[:, 1], start[:, 0])
     cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
-    sweep = np.arctan2(cross, (start * end).sum(axis=1))
+    sweep = arctan2(cross, (start * end).sum(axis=1))
     low = np.minimum(from_angle, from_angle + sweep) / turn - 0.5
     high = np.maximum(from_angle, from_angle + sweep) / turn - 0.5
     first = np.ceil(low).astype(np.int64)
     segment, offset = _ranges(np.floor(high).astype(np.int64) - first + 1)
     column = first[segment] + offset
     angle = (column + 0.5) * turn
-    ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    ray = np.stack([cos(angle), sin(angle)], axis=1)
     side = (end - start)[segment]
     below = ray[:, 0] * side[:, 1] - ray[:, 1] * side[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -179,11 +183,11 @@ def _cloud_hits(local: Floats, grid: Grid) -> Hits:
     """The points themselves."""
     inside = (local[:, 2] >= grid.low) & (local[:, 2] <= grid.high)
     local = local[inside]
-    angle = np.arctan2(local[:, 1], local[:, 0]) % (2 * np.pi)
+    angle = arctan2(local[:, 1], local[:, 0]) % (2 * np.pi)
     return Hits(
         local[:, 2],
         angle,
-        np.hypot(local[:, 0], local[:, 1]),
+        np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2),
         grid.row(local[:, 2]) * grid.columns + grid.column(angle),
         np.zeros(len(local)),
     )
@@ -215,7 +219,7 @@ class Shape(NamedTuple):
     def at_points(self, local: Floats, grid: Grid) -> Floats:
         """Radius at the height and angle of points in the frame of the axis."""
         u = np.clip((local[:, 2] - grid.low) / (grid.high - grid.low), 0.0, 1.0)
-        return self._values(u, np.arctan2(local[:, 1], local[:, 0]))
+        return self._values(u, arctan2(local[:, 1], local[:, 0]))
 
     def ring_radii(self) -> Floats:
         """Radii on a grid of 24 heights and 24 angles."""
@@ -245,7 +249,6 @@ def regress(
     nearest if none is close: so the body wins over a handle in front of it, and the outer wall
     over the inner one.
     """
-    from scipy.linalg import cho_factor, cho_solve
     from scipy.sparse import csr_array
 
     u = np.clip((hits.height - grid.low) / (grid.high - grid.low), 0.0, 1.0)
@@ -266,9 +269,9 @@ def regress(
         # Every cell counts the same, however many points it holds.
         balanced = weights / np.maximum(per_cell[hits.cell], 1.0)
         weighted = design.multiply(balanced[:, None]).tocsr()
-        normal = (design.T @ weighted).toarray() + (stiff if start is None and round_ < 2 else soft)
-        factor = cho_factor(normal, check_finite=False)
-        coefficients = cho_solve(factor, weighted.T @ hits.radius, check_finite=False)
+        normal = _lower_band(design.T @ weighted, columns)
+        normal += stiff if start is None and round_ < 2 else soft
+        coefficients = solve_banded(normal, weighted.T @ hits.radius)
         error = hits.radius - design @ coefficients
         chosen = outer_wall(hits, grid, error, close)
         if round_ == 0 and start is None:
@@ -316,18 +319,37 @@ def _design(u: Floats, theta: Floats, intervals: int, columns: int) -> Any:
     return coo_array((values.ravel(), (owner, cells.ravel())), shape=shape)
 
 
+def _lower_band(matrix: Any, columns: int) -> Floats:
+    """A symmetric matrix as :func:`solve_banded` wants it. Shape (n, 4 · columns).
+
+    Functions overlap with those of three rows on either side, and any column of them.
+    """
+    entries = matrix.tocoo()
+    band = np.zeros((matrix.shape[0], 4 * columns))
+    lower = entries.row >= entries.col
+    row, col = entries.row[lower], entries.col[lower]
+    band[row, col - row + 4 * columns - 1] = entries.data[lower]
+    return band
+
+
 def _penalty(intervals: int, columns: int, smoothing: Smoothing) -> Floats:
     """Roughness of the coefficients: second differences both ways, and first ones around.
+
+    The lower band of its matrix.
 
     Small beside the data. Where there are none, the first differences around the axis outweigh the
     others and draw the unseen side to the seen one at the same height.
     """
+    from scipy.sparse import csr_array, kron
+
     rows = intervals + 3
-    second = np.diff(np.eye(rows), 2, axis=0)
+    second = csr_array(np.diff(np.eye(rows), 2, axis=0))
     ring = np.eye(columns)
-    around = np.roll(ring, -1, axis=0) - ring
-    bend = np.roll(ring, -1, axis=0) - 2 * ring + np.roll(ring, 1, axis=0)
-    along = np.kron(smoothing.bending * second.T @ second, ring)
-    rings = smoothing.bending * bend.T @ bend + smoothing.symmetry * around.T @ around
-    across = np.kron(np.eye(rows), rings)
-    return along + across + 1e-9 * np.eye(rows * columns)
+    around = csr_array(np.roll(ring, -1, axis=0) - ring)
+    bend = csr_array(np.roll(ring, -1, axis=0) - 2 * ring + np.roll(ring, 1, axis=0))
+    along = kron(smoothing.bending * (second.T @ second), csr_array(ring))
+    rings = smoothing.bending * (bend.T @ bend) + smoothing.symmetry * (around.T @ around)
+    across = kron(csr_array(np.eye(rows)), rings)
+    band = _lower_band(csr_array(along + across), columns)
+    band[:, -1] += 1e-9
+    return band

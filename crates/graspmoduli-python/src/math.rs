@@ -37,10 +37,10 @@ pub fn arctan2<'py>(
     py: Python<'py>,
     y: PyReadonlyArray1<'py, f64>,
     x: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let pairs = y.as_slice()?.iter().zip(x.as_slice()?);
+) -> Bound<'py, PyArray1<f64>> {
+    let pairs = y.as_array().into_iter().zip(x.as_array());
     let angles: Vec<f64> = pairs.map(|(&y, &x)| math::atan2(y, x)).collect();
-    Ok(angles.into_pyarray(py))
+    angles.into_pyarray(py)
 }
 
 /// Coefficients of the spline surface with these radii at the Greville sites and the angles 2πj/n.
