@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-extras test-browser lint format reproduce docs bench clean prerequisites
+.PHONY: help demo test portable test-extras test-browser lint format reproduce docs bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -35,6 +35,9 @@ test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwrig
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
 	    --editable '.[view]' 'playwright>=1.50'
 	$(BIN)/pytest tests/browser
+
+portable: $(READY) ## The same answers under every instruction set of this machine
+	$(BIN)/python tests/portable/check.py
 
 lint: $(READY) ## Formatting, clippy, ruff and types
 	cargo fmt --check
