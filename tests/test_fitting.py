@@ -193,6 +193,16 @@ def test_the_same_points_give_the_same_bits():
     np.testing.assert_array_equal(one.pose, two.pose)
 
 
+@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.0, 1.0, 2.0), (1.3, 1.3, 0.9)])
+def test_the_axis_of_a_symmetric_object_does_not_depend_on_last_bits(sides):
+    box = trimesh.creation.box(sides).subdivide().subdivide()
+    wanted = quiet_fit(box)
+    for seed in range(3):
+        noise = 1e-13 * np.random.default_rng(seed).normal(size=box.vertices.shape)
+        found = quiet_fit((np.asarray(box.vertices) + noise, box.faces))
+        np.testing.assert_allclose(found.pose, wanted.pose, atol=1e-9)
+
+
 def cloud(n=500):
     return np.random.default_rng(0).normal(size=(n, 3))
 

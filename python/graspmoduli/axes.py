@@ -136,7 +136,10 @@ def refined(thing: Object, axis: Axis) -> Axis:
 
 def _along(rows: Floats, vector: Floats) -> Floats:
     """Σ_k rows[:, k] · vector[k]."""
-    return sum((rows[:, k] * vector[k] for k in range(1, len(vector))), rows[:, 0] * vector[0])
+    total = rows[:, 0] * vector[0]
+    for k in range(1, len(vector)):
+        total = total + rows[:, k] * vector[k]
+    return total
 
 
 def _products(one: Floats, other: Floats) -> Floats:

@@ -51,7 +51,8 @@ class Axis(NamedTuple):
     def local(self, points: Floats) -> Floats:
         """Points in this frame. Shape (n, 3)."""
         moved = points - self.origin
-        return sum(moved[:, k, None] * self.rotation[k] for k in range(3))
+        x, y, z = (moved[:, k, None] * self.rotation[k] for k in range(3))
+        return x + y + z
 
 
 class Hits(NamedTuple):
@@ -151,7 +152,7 @@ def _mesh_hits(local: Floats, faces: NDArray[np.int64], grid: Grid) -> Hits:
     first = np.ceil(low).astype(np.int64)
     segment, offset = _ranges(np.floor(high).astype(np.int64) - first + 1)
     column = first[segment] + offset
-    angle = (column + 0.5) * turn
+    angle = (column.astype(np.float64) + 0.5) * turn
     ray = np.stack([cos(angle), sin(angle)], axis=1)
     side = (end - start)[segment]
     below = ray[:, 0] * side[:, 1] - ray[:, 1] * side[:, 0]
