@@ -484,3 +484,30 @@ fn supports(wrenches: &[Twist], edges: usize, direction: &Twist) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_waits_for_a_worker_that_panicked() {
+        let running = Running::new(2);
+        std::thread::scope(|scope| {
+            let panics = scope.spawn(|| {
+                let _guard = Leave(&running);
+                panic!("a worker's end, which the test wants");
+            });
+            assert!(panics.join().is_err());
+            assert!(!running.is_over());
+            drop(Leave(&running));
+            assert!(running.is_over());
+        });
+    }
+
+    #[test]
+    fn numbers_of_subsets_do_not_overflow() {
+        assert_eq!(subsets(200, 3), 1_313_400);
+        assert_eq!(subsets(3, 4), 0);
+        assert_eq!(subsets(10_000, 5_000), u64::MAX);
+    }
+}

@@ -68,9 +68,11 @@ fn hand<P: Strategy<Value = DVec3> + 'static>(
     (prop::collection::vec(contact, 1..7), point())
 }
 
+/// `FUZZ=100 cargo test --release --test quality` tries a hundred times as many.
 fn cases(cases: u32) -> ProptestConfig {
+    let factor = std::env::var("FUZZ").map_or(Ok(1), |text| text.parse());
     ProptestConfig {
-        cases,
+        cases: cases * factor.unwrap_or(1),
         failure_persistence: None,
         // The same cases everywhere; to look for others, change the seed.
         rng_seed: RngSeed::Fixed(2013),
