@@ -2,6 +2,7 @@
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
 mod domain;
+mod pool;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
@@ -16,6 +17,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyReadonlyArrayDyn,
 };
+use pool::detached;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -92,8 +94,7 @@ fn quality<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, norm(each), &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.quality(&cone, norm(each), &mut out)).map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -112,8 +113,7 @@ fn quality_gradient<'py>(
     let width = Gradient::width(contacts.as_array().shape()[1]);
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len() * width];
-    py.detach(|| batch.gradient(&cone, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.gradient(&cone, &mut out)).map_err(raise)?;
     PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
@@ -133,8 +133,7 @@ fn quality_at_least<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![false; batch.centers.len()];
-    py.detach(|| batch.is_at_least(&cone, threshold, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.is_at_least(&cone, threshold, &mut out)).map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -153,7 +152,7 @@ fn extreme_quality(
 ) -> PyResult<Option<(usize, f64)>> {
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
-    py.detach(|| {
+    detached(py, || {
         if largest {
             batch.largest(&cone)
         } else {
@@ -176,8 +175,7 @@ fn circular_quality<'py>(
     let cone = cone(friction, 3, 0.0)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![[0.0; 2]; batch.centers.len()];
-    py.detach(|| batch.circular(&cone, tolerance, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.circular(&cone, tolerance, &mut out)).map_err(raise)?;
     table(py, out)
 }
 
@@ -335,7 +333,7 @@ fn sample_points<'py>(
     square: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let square = square.as_slice()?.as_chunks().0;
-    let points = py.detach(|| sampling::by_area(&surface.0, square));
+    let points = detached(py, || sampling::by_area(&surface.0, square));
     table(py, points)
 }
 
@@ -402,7 +400,7 @@ fn synthesize<'py>(
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
-    let found = py.detach(|| {
+    let found = detached(py, || {
         synthesis::synthesize(
             &surface.0,
             center_of_mass.into(),
@@ -476,7 +474,7 @@ impl PyDeformation {
     ) -> PyResult<Vec<Transferred<'py>>> {
         let cone = cone(friction, edges, 0.0)?;
         let grasps = coordinates(&grasps)?;
-        let carried = py.detach(|| self.0.naive(&grasps, &cone, samples));
+        let carried = detached(py, || self.0.naive(&grasps, &cone, samples));
         transferred(py, carried)
     }
 
@@ -501,7 +499,7 @@ impl PyDeformation {
             length,
             difference,
         };
-        let carried = py.detach(|| self.0.by_gradient(&grasps, &cone, schedule));
+        let carried = detached(py, || self.0.by_gradient(&grasps, &cone, schedule));
         transferred(py, carried)
     }
 
@@ -521,7 +519,9 @@ impl PyDeformation {
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
             .collect();
         let cells = cells(allowed.as_ref())?;
-        let carried = py.detach(|| self.0.by_ascent(&grasps, &cone, region(cells.as_ref())));
+        let carried = detached(py, || {
+            self.0.by_ascent(&grasps, &cone, region(cells.as_ref()))
+        });
         transferred(py, carried)
     }
 }
@@ -543,6 +543,14 @@ fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferre
 /// The compiled kernels of graspmoduli.
 #[pymodule]
 mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::pool::remember_process();
+        Ok(())
+    }
+
     #[pymodule_export]
     use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
     #[pymodule_export]
