@@ -104,7 +104,7 @@ def bad_files(tmp_path):
         (["noise.glb"], "a whole GLB file"),
         (["noise.pcd"], "a whole PCD file"),
         (["words.xyz"], "a whole XYZ file"),
-        (["nan.npy"], "must be finite"),
+        (["nan.npy"], "at least 50 points"),
         (["few.npy"], "at least 50 points"),
         (["flat.npy"], "on a plane"),
         (["wide.npy"], "points of shape (n, 3)"),
