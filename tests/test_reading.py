@@ -1,6 +1,5 @@
 """Readers: every format, what is missing in it, and what is broken."""
 
-import os
 import warnings
 
 import numpy as np
@@ -44,15 +43,18 @@ def test_every_format_holds_the_same_object(tmp_path, name):
 @given(what=mutations.changes)
 def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path, name, what):
     path = write(tmp_path, name, mutations.changed(FILES[name], what))
+    thing, sentence = None, ""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", UserWarning)
         try:
             thing = read(path)
         except gm.GraspModuliError as error:
-            assert "\n" not in str(error)
-            assert len(str(error)) < 500
-            return
+            sentence = str(error)
+    if thing is None:
+        assert 0 < len(sentence) < 500
+        assert "\n" not in sentence
+        return
     for array in (thing.points, thing.samples, thing.sample_normals):
         assert np.isfinite(array).all()
     assert 0.0 < thing.size < np.inf
@@ -122,9 +124,9 @@ def test_missing_pixels_are_left_out_and_counted(tmp_path):
     missing = int(np.isnan(points[..., 0]).sum())
     assert 0 < missing < 2400
     header = (
-        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 60\nHEIGHT 40\n"
-        "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2400\nDATA binary\n"
-    ).encode()
+        b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 60\nHEIGHT 40\n"
+        b"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2400\nDATA binary\n"
+    )
     (tmp_path / "p.pcd").write_bytes(header + points.astype(np.float32).tobytes())
     np.save(tmp_path / "p.npy", points)
     for source in (points, points.reshape(-1, 3), tmp_path / "p.pcd", tmp_path / "p.npy"):
@@ -200,19 +202,19 @@ class TestSeveralObjects:
 
     def test_of_points_a_narrow_gap_is_told(self):
         with pytest.warns(UserWarning, match="in 2 parts with a narrow space"):
-            read(np.vstack([can(), can() + [2.2, 0, 0]]))
+            read(np.vstack([can(), can() + np.array([2.2, 0, 0])]))
         with pytest.raises(gm.GraspModuliError, match="a single one, got 2 parts"):
-            read(np.vstack([can(), can() + [3.5, 0, 0]]))
+            read(np.vstack([can(), can() + np.array([3.5, 0, 0])]))
 
     def test_a_small_part_is_told(self):
         with pytest.warns(UserWarning, match="3.[0-9]% of the object lies apart"):
-            read(np.vstack([can(), 0.3 * can(150) + [8, 0, 0]]))
+            read(np.vstack([can(), 0.3 * can(150) + np.array([8, 0, 0])]))
 
     def test_few_points_are_not_taken_for_parts(self):
         assert read(can(200)).size > 2.0
 
 
 def test_a_name_that_cannot_be_is_one_sentence():
-    for name in ("x" * 300 + ".ply", "a\0b.ply", os.sep.join(["y" * 300, "z.ply"])):
+    for name in ("x" * 300 + ".ply", "a\0b.ply", "y" * 300 + "/z.ply"):
         with pytest.raises(gm.GraspModuliError, match="object must be a file that exists"):
             read(name)

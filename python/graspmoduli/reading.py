@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import warnings
 from dataclasses import dataclass
@@ -118,7 +119,14 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     promised = _promised_vertices(path)
     _check_text(path)
     # As it is: vertices are neither merged nor, if not finite, dropped.
-    scene = trimesh.load_scene(path, process=False)
+    log = logging.getLogger("trimesh")
+    level = log.level
+    # What it cannot make sense of it would tell with a traceback.
+    log.setLevel(logging.CRITICAL)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    finally:
+        log.setLevel(level)
     meshes: list[Any] = []
     clouds: list[Any] = []
     for geometry in scene.dump():
@@ -179,6 +187,11 @@ def _check_text(path: Path) -> None:
         raise GraspModuliError(f"object must be a whole {name} file, got {path} with zeroed bytes")
     if kind == ".stl" and b"endsolid" not in text:
         raise GraspModuliError(f"object must be a whole STL file, got {path} without its end")
+    if kind == ".stl" and text.count(b"vertex ") != 3 * text.count(b"endfacet"):
+        raise GraspModuliError(
+            f"object must be a whole STL file, got {path} with {text.count(b'vertex ')} vertices "
+            f"for {text.count(b'endfacet')} facets"
+        )
     if kind != ".off":
         return
     lines = [line.split(b"#")[0].split() for line in text.splitlines()]
