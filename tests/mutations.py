@@ -5,6 +5,7 @@ import io
 import numpy as np
 import trimesh
 from hypothesis import strategies as st
+from trimesh.exchange.stl import export_stl_ascii
 
 #: Files that are read as points.
 CLOUDS = ("xyz", "npy", "pcd", "binary pcd")
@@ -19,7 +20,7 @@ def files():
     for kind in ("obj", "off", "stl", "glb"):
         data = mesh.export(file_type=kind)
         found[kind] = data.encode() if isinstance(data, str) else data
-    found["ascii stl"] = trimesh.exchange.stl.export_stl_ascii(mesh).encode()
+    found["ascii stl"] = export_stl_ascii(mesh).encode()
     found["ply"] = mesh.export(file_type="ply")
     found["ascii ply"] = mesh.export(file_type="ply", encoding="ascii")
     rows = "\n".join(" ".join(f"{x:.7g}" for x in point) for point in points).encode() + b"\n"

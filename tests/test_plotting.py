@@ -128,5 +128,7 @@ def test_quality_along_paths_marks_the_lowest_point():
     assert axes.get_ylim()[1] >= along.quality.max()
     curve, low = axes.lines[:2]
     np.testing.assert_array_equal(curve.get_ydata(), along.quality)
-    assert low.get_xydata().tolist() == [[along.worst_t, along.worst_quality]]
-    assert [t.get_text() for t in axes.get_legend().get_texts()] == ["along", "carried", "lowest"]
+    np.testing.assert_array_equal(low.get_xydata(), [[along.worst_t, along.worst_quality]])
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [t.get_text() for t in legend.get_texts()] == ["along", "carried", "lowest"]

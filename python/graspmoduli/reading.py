@@ -386,7 +386,8 @@ def _check_single(thing: Object) -> None:
     from scipy.spatial import KDTree
 
     tree = KDTree(thing.samples)
-    near = 4.0 * float(np.median(tree.query(thing.samples, k=2)[0][:, 1]))
+    distances, _ = tree.query(thing.samples, k=[2])
+    near = 4.0 * float(np.median(np.asarray(distances)))
 
     def shares(gap: float) -> Floats:
         return np.sort(_parts(tree, max(gap * thing.size, near)))[::-1] / len(thing.samples)
