@@ -366,7 +366,7 @@ def _cloud_samples(points: Floats) -> tuple[Floats, Floats]:
     samples = points[np.sort(random.choice(len(points), count, replace=False))]
     # Neighbourhoods as wide as the noise is deep: more points where there are more.
     neighbours = int(np.clip(len(points) // 150, 12, 60))
-    _, index = KDTree(points).query(samples, k=min(neighbours, len(points)))
+    index: Any = KDTree(points).query(samples, k=min(neighbours, len(points)))[1]
     around = points[index] - points[index].mean(axis=1, keepdims=True)
     squares, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
     # A solid looks flat from near by; a plane or a line with noise is as thick there as anywhere.
@@ -386,8 +386,8 @@ def _check_single(thing: Object) -> None:
     from scipy.spatial import KDTree
 
     tree = KDTree(thing.samples)
-    distances, _ = tree.query(thing.samples, k=[2])
-    near = 4.0 * float(np.median(np.asarray(distances)))
+    distances: Any = tree.query(thing.samples, k=2)[0]
+    near = 4.0 * float(np.median(distances[:, 1]))
 
     def shares(gap: float) -> Floats:
         return np.sort(_parts(tree, max(gap * thing.size, near)))[::-1] / len(thing.samples)
