@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test portable test-extras test-browser lint format reproduce docs bench clean prerequisites
+.PHONY: help demo test test-long portable test-extras test-browser lint format reproduce docs bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -17,11 +17,15 @@ demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
 	@$(BIN)/graspmoduli grasp examples/objects/yogurt_bottle.ply \
 	    --json out/yogurt_bottle.json --picture out/yogurt_bottle.png
 
-test: $(READY) ## Every test, Rust and Python
+test: $(READY) ## Every test that is quick, Rust and Python
 	cargo test --release --quiet --package graspmoduli
 	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser \
 	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py \
-	    --ignore python/graspmoduli/viewer.py python tests
+	    --ignore python/graspmoduli/viewer.py -m 'not long' python tests
+
+test-long: $(READY) ## The tests that take longer: whole runs, killed runs, damaged files
+	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser -m long tests
+	$(BIN)/python tests/long_fuzz.py 3000
 
 test-extras: $(READY) ## The tests of torch, jax and dask: installs them, several gigabytes
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \

@@ -1,6 +1,10 @@
 """Shared fixtures."""
 
+import os
 from pathlib import Path
+
+# The tests run side by side; threads of BLAS would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest

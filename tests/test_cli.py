@@ -8,9 +8,12 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import graspmoduli as gm
 from conftest import ROOT
+from graspmoduli import cli
 
 BOTTLE = ROOT / "examples" / "objects" / "baby_bottle.ply"
 
@@ -104,7 +107,7 @@ def bad_files(tmp_path):
         (["noise.glb"], "a whole GLB file"),
         (["noise.pcd"], "a whole PCD file"),
         (["words.xyz"], "a whole XYZ file"),
-        (["nan.npy"], "must be finite"),
+        (["nan.npy"], "at least 50 points"),
         (["few.npy"], "at least 50 points"),
         (["flat.npy"], "on a plane"),
         (["wide.npy"], "points of shape (n, 3)"),
@@ -125,14 +128,41 @@ def bad_files(tmp_path):
     ],
     ids=str,
 )
-def test_wrong_input_gives_one_line_and_exit_code_2(bad_files, arguments, sentence):
+def test_wrong_input_gives_one_line_and_exit_code_2(
+    bad_files, arguments, sentence, monkeypatch, capsys
+):
     before = sorted(p.name for p in bad_files.iterdir())
-    result = run("grasp", *arguments, cwd=bad_files)
-    assert result.returncode == 2, result.stdout + result.stderr
-    assert sentence in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
-    assert result.stdout == ""
+    monkeypatch.chdir(bad_files)
+    assert cli._run(["grasp", *map(str, arguments)]) == 2
+    output = capsys.readouterr()
+    assert sentence in output.err
+    assert len(output.err.strip().splitlines()) == 1, output.err
+    assert output.out == ""
     assert sorted(p.name for p in bad_files.iterdir()) == before
+
+
+#: What people and programs write where a number is wanted.
+VALUES = st.one_of(
+    st.integers().map(str),
+    st.floats().map(str),
+    st.text(max_size=8).filter(lambda text: "\0" not in text),
+    st.sampled_from(["", "nan", "-inf", "1e400", "0x10", "1_000", "٣", "9" * 5000, "-0", "1e-320"]),
+)
+
+
+@settings(max_examples=150, derandomize=True, deadline=None, database=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])  # fmt: skip
+@given(
+    option=st.sampled_from(["--friction", "--edges", "--top", "--seed", "--colour"]), value=VALUES
+)
+def test_any_value_of_an_option_is_taken_or_refused_in_one_line(tmp_path, capsys, option, value):
+    # The object is not there: what passes the options is told so.
+    code = cli._run(["grasp", str(tmp_path / "none.ply"), f"{option}={value}"])
+    output = capsys.readouterr()
+    assert code == 2
+    assert output.err.startswith("graspmoduli: ")
+    assert len(output.err) < 400 + 2 * len(str(tmp_path))
+    assert output.err.count("\n") == 1
 
 
 def test_a_failure_after_the_start_leaves_old_output_alone(bad_files):

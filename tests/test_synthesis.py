@@ -113,7 +113,9 @@ class TestSearch:
         u, theta = gm.sample_points(surface, 120)
         calls = []
         gm.best_grasps(surface, u, theta, progress=lambda done, total: calls.append((done, total)))
-        assert calls[-1][0] <= calls[-1][1] == 120 * 119 * 118 // 6
+        total = 120 * 119 * 118 // 6
+        assert calls[-1] == (total, total)
+        assert calls == sorted(calls)
 
         def stop(done, total):
             raise KeyboardInterrupt
@@ -207,9 +209,16 @@ class TestSynthesis:
         assert value == pytest.approx(best.quality, rel=1e-12)
 
     def test_little_friction_finds_fewer_grasps_without_failing(self):
-        for friction in (0.05, 0.2):
-            for ranked in gm.synthesize(gm.shapes.MODELS["e"], friction=friction):
-                assert ranked.quality > 0
+        surface = gm.shapes.MODELS["e"]
+        best = []
+        for friction in (0.05, 0.2, 1.0):
+            found = gm.synthesize(surface, friction=friction)
+            for ranked in found:
+                placed = gm.place(surface, ranked.grasp)
+                assert ranked.quality == pytest.approx(placed.quality(friction=friction)) != 0.0
+            best.append(found[0].quality if found else 0.0)
+        assert best == sorted(best)
+        assert best[1] > 0.0
 
     def test_wrong_input(self):
         with pytest.raises(gm.GraspModuliError, match="allowed must have shape"):

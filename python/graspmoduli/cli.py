@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
+import logging
+import os
+import shutil
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -23,15 +28,17 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from . import _arrays
+from . import _arrays, _signals
 from ._core import GraspModuliError
-from ._files import replacing
+from ._files import check_output, replacing
 
 app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    help="Grasps for real objects, ranked by exact grasp quality.",
+    help="Grasps for real objects, ranked by exact grasp quality. Exit codes: 0 done, 1 no grasp "
+    "found, 2 wrong input or an output that cannot be written, 130 interrupted (Ctrl-C), "
+    "143 terminated.",
 )
 
 #: Pictures by the ending of their file's name.
@@ -40,31 +47,71 @@ PICTURES = (".png", ".svg", ".pdf", ".jpg", ".jpeg", ".webp")
 
 def main() -> None:
     """Entry point: errors are one line on standard error; wrong input exits with 2."""
-    code = None
+    _signals.heed()
+    for stream in (sys.stdout, sys.stderr):
+        # What the output's encoding lacks is written as an escape.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    # Pictures are drawn without a window, whatever the environment asks of matplotlib.
+    os.environ["MPLBACKEND"] = "agg"
     try:
-        code = app(standalone_mode=False)
-    except GraspModuliError as error:
-        _fail(str(error))
+        code = _run(sys.argv[1:])
     except (KeyboardInterrupt, EOFError):
-        print("graspmoduli: interrupted", file=sys.stderr)
-        sys.exit(130)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(1)
+        code = _signals.code(signal.SIGINT)
+    except _signals.Terminated as ended:
+        code = _signals.code(ended.number)
+    sys.exit(code)
+
+
+def _run(arguments: list[str]) -> int:
+    """A command's exit code."""
+    try:
+        command = typer.main.get_command(app)
+        with command.make_context("graspmoduli", arguments) as context:
+            command.invoke(context)
+        code = 0
+    except typer.Exit as end:
+        code = end.exit_code
+    except GraspModuliError as error:
+        return _fail(str(error))
+    except MemoryError:
+        return _fail("object and options must fit into memory, got too little of it")
+    except OSError as error:
+        return _no_output(error)
     except Exception as error:
         # Usage errors of the command-line library carry their own sentence.
         message = getattr(error, "format_message", None)
         if message is None:
-            if type(error).__name__ == "Abort":
-                sys.exit(130)
             raise
-        _fail(" ".join(message().split()))
-    sys.exit(code if isinstance(code, int) else 0)
+        return _fail(" ".join(message().split()))
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        return _no_output(error)
+    return code
 
 
-def _fail(message: str) -> None:
-    print(f"graspmoduli: {message}", file=sys.stderr)
-    sys.exit(2)
+class _Console(Console):
+    """Standard output as rich writes to it, but whoever closes it is told of in :func:`_run`."""
+
+    def on_broken_pipe(self) -> None:
+        """Called while the error is handled."""
+        raise
+
+
+def _fail(message: str) -> int:
+    _signals.say(message)
+    return 2
+
+
+def _no_output(error: OSError) -> int:
+    """Standard output was closed by who reads it, or is full."""
+    with contextlib.suppress(OSError, ValueError):
+        # What it did not take is not tried again at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    where = f" ({error.filename})" if error.filename else ""
+    return _fail(f"standard output must take what is written, got {error.strerror}{where}")
 
 
 @app.callback(invoke_without_command=True)
@@ -83,7 +130,10 @@ def _root(
 def grasp(
     thing: Annotated[
         str,
-        typer.Argument(metavar="OBJECT", help="Mesh or point cloud (PLY OBJ STL GLB PCD XYZ NPY)."),
+        typer.Argument(
+            metavar="OBJECT",
+            help="Mesh or point cloud (PLY OBJ STL GLB GLTF OFF PCD XYZ TXT NPY).",
+        ),
     ],
     friction: Annotated[str, typer.Option(help="Coulomb friction coefficient μ > 0.")] = "1.0",
     edges: Annotated[str, typer.Option(help="Edges l of the friction cones, at least 3.")] = "8",
@@ -103,34 +153,26 @@ def grasp(
     _arrays.cone(mu, l)
     count = _arrays.count("top", _number("top", top, int), 1)
     start = _arrays.count("seed", _number("seed", seed, int), 0)
-    if picture is not None and picture.suffix.lower() not in PICTURES:
-        raise GraspModuliError(
-            f"picture must be a file of a known format ({' '.join(PICTURES)}), got {picture.name}"
-        )
-    # Outputs that cannot be written are found out before the work; both appear at the end.
-    with contextlib.ExitStack() as outputs:
-        json_path = outputs.enter_context(replacing(json_file)) if json_file else None
-        picture_path = outputs.enter_context(replacing(picture)) if picture else None
-        with _progress() as step, _warnings():
-            found = _find(thing, mu, l, count, start, step)
-            if json_path is not None:
-                json_path.write_text(json.dumps(_report(thing, *found[1:], mu, l), indent=2) + "\n")
-            if picture_path is not None:
-                step("drawing", 0.85)
-                from .plotting import plot_grasps
-
-                figure = plot_grasps(*found, friction=mu, edges=l, title=Path(thing).name)
-                figure.savefig(picture_path)
+    # Outputs that cannot be written are found out before the work; all are written at its end.
+    _check_outputs(thing, json=json_file, picture=picture)
+    image = b""
+    with _progress() as step, _warnings():
+        found = _find(thing, mu, l, count, start, step)
+        if picture is not None:
+            step("drawing", 0.85)
+            image = _image(picture, thing, found, mu, l)
     _, fit, grasps = found
+    if json_file is not None:
+        report = json.dumps(_report(thing, fit, grasps, mu, l), indent=2) + "\n"
+        _write(json_file, report.encode())
+    if picture is not None:
+        _write(picture, image)
     _print(thing, fit, grasps, l)
     for path in (json_file, picture):
         if path is not None:
             print(f"wrote {path}")
     if not grasps:
-        print(
-            "graspmoduli: no force-closure grasp found; more friction or a fuller scan may help",
-            file=sys.stderr,
-        )
+        _signals.say("no force-closure grasp found; more friction or a fuller scan may help")
         raise typer.Exit(1)
 
 
@@ -192,7 +234,7 @@ def reproduce(
         for row in outcome.rows:
             agrees = {True: "yes", False: "no", None: ""}[row.agrees]
             table.add_row(name, row.what, row.paper, row.ours, agrees)
-    output = Console(highlight=False, width=None if sys.stdout.isatty() else 140)
+    output = _Console(highlight=False, width=None if _is_terminal(sys.stdout) else 140)
     if table.row_count:
         output.print(table)
     print(f"wrote {out / 'report.html'}, {out / 'report.md'} and {out / 'results.json'}")
@@ -229,48 +271,78 @@ def view(
     saved = html is not None or picture is not None
     if saved and thing is None:
         raise GraspModuliError("OBJECT must be given for html and picture, got none")
-    if picture is not None and picture.suffix.lower() not in PICTURES:
-        raise GraspModuliError(
-            f"picture must be a file of a known format ({' '.join(PICTURES)}), got {picture.name}"
-        )
     if shapes and thing is None:
         raise GraspModuliError(
             "OBJECT must be given for shapes, got none; without it they are shown"
         )
+    if shapes and saved:
+        raise GraspModuliError("shapes must be shown in a browser, got html or picture with it")
+    if thing is not None:
+        _check_outputs(thing, html=html, picture=picture)
     from . import viewer
 
     if not saved:
         # A busy port is found out before the work.
         viewer.free_port(at)
-    with contextlib.ExitStack() as outputs:
-        page = outputs.enter_context(replacing(html)) if html else None
-        image = outputs.enter_context(replacing(picture)) if picture else None
-        server = None
-        if thing is None:
-            server = viewer.serve_shapes(at)
+    page = image = b""
+    if thing is None:
+        server = viewer.serve_shapes(at)
+    else:
+        with _progress() as step, _warnings():
+            found = _find(thing, mu, l, 5, 0, step)
+            if html is not None:
+                best = found[2][0] if found[2] else None
+                page = viewer.page_of(*found[:2], best, mu, l).encode()
+            if picture is not None:
+                image = _image(picture, thing, found, mu, l)
+        for path, data in ((html, page), (picture, image)):
+            if path is not None:
+                _write(path, data)
+                print(f"wrote {path}")
+        if saved:
+            return
+        if shapes:
+            fit = found[1]
+            unit = (1.0 / fit.length_scale) * fit.surface
+            server = viewer.serve_shapes(at, {Path(thing).name: unit})
         else:
-            with _progress() as step, _warnings():
-                found = _find(thing, mu, l, 5, 0, step)
-                if page is not None:
-                    best = found[2][0] if found[2] else None
-                    page.write_text(viewer.page_of(*found[:2], best, mu, l))
-                if image is not None:
-                    from .plotting import plot_grasps
+            server = viewer.serve_object(at, *found, mu, l, Path(thing).name)
+    print(f"open http://127.0.0.1:{server.get_port()} in a browser; Ctrl-C ends", flush=True)
+    server.sleep_forever()
 
-                    figure = plot_grasps(*found, friction=mu, edges=l, title=Path(thing).name)
-                    figure.savefig(image)
-            if shapes and not saved:
-                fit = found[1]
-                unit = (1.0 / fit.length_scale) * fit.surface
-                server = viewer.serve_shapes(at, {Path(thing).name: unit})
-            elif not saved:
-                server = viewer.serve_object(at, *found, mu, l, Path(thing).name)
-    for path in (html, picture):
-        if path is not None:
-            print(f"wrote {path}")
-    if server is not None:
-        print(f"open http://127.0.0.1:{server.get_port()} in a browser; Ctrl-C ends", flush=True)
-        server.sleep_forever()
+
+def _check_outputs(thing: str, **outputs: Path | None) -> None:
+    """Each can be written, and none is the object or one of the others."""
+    taken = [Path(thing)]
+    for name, path in outputs.items():
+        if path is None:
+            continue
+        if name == "picture" and path.suffix.lower() not in PICTURES:
+            raise GraspModuliError(
+                f"picture must be a file of a known format ({' '.join(PICTURES)}), got {path.name}"
+            )
+        check_output(name, path, taken)
+        taken.append(path)
+
+
+def _write(path: Path, data: bytes) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def _image(path: Path, thing: str, found: Any, friction: float, edges: int) -> bytes:
+    from .plotting import plot_grasps
+
+    # Dollars would start a formula; what is no character of any language cannot be drawn.
+    title = Path(thing).name.replace("$", "\\$").encode("utf-8", "replace").decode()
+    figure = plot_grasps(*found, friction=friction, edges=edges, title=title)
+    # Characters that no font has are drawn as boxes, without a word.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        figure.savefig(buffer, format=path.suffix[1:].lower())
+    return buffer.getvalue()
 
 
 def _find(
@@ -326,17 +398,14 @@ def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
         f"size, {fit.coverage:.0%} of the surface seen, "
         f"{fit.unexplained:.1%} of the wall unexplained",
     ]
-    table = Table(box=None, padding=(0, 2), header_style="bold")
-    table.add_column("#", justify="right")
-    table.add_column(f"Q_{edges}", justify="right")
-    for finger in (1, 2, 3):
-        table.add_column(f"finger {finger}  (x, y, z)", justify="right")
     digits = max(0, 3 - int(f"{fit.residual.size:e}".split("e")[1]))
-    for rank, grasp in enumerate(grasps, 1):
-        points = [", ".join(f"{x:.{digits}f}" for x in point) for point in grasp.contacts]
-        table.add_row(str(rank), f"{grasp.quality:.4f}", *points)
     # Wide enough for the table when the output is not a terminal.
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+    width = shutil.get_terminal_size().columns if _is_terminal(sys.stdout) else 120
+    table = _table(grasps, edges, digits, stacked=False)
+    if _width(table) > width:
+        table = _table(grasps, edges, digits, stacked=True)
+    # What is wider still is for the terminal to wrap: no digit is lost.
+    console = _Console(highlight=False, width=max(width, _width(table)), height=25)
     for line in lines:
         console.print(line, soft_wrap=True, markup=False)
     if grasps:
@@ -350,12 +419,42 @@ def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
         )
 
 
+def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
+    """Grasps by rank: fingers side by side, or one below the other where it is narrow."""
+    table = Table(box=None, padding=(0, 1 if stacked else 2), header_style="bold")
+    columns = ["#", f"Q_{edges}"]
+    if stacked:
+        columns += ["finger", "(x, y, z)"]
+    else:
+        columns += [f"finger {finger}  (x, y, z)" for finger in (1, 2, 3)]
+    for column in columns:
+        table.add_column(column, justify="right", no_wrap=True)
+    for rank, grasp in enumerate(grasps, 1):
+        points = [", ".join(f"{x:.{digits}f}" for x in point) for point in grasp.contacts]
+        head = [str(rank), f"{grasp.quality:.4f}"]
+        if stacked:
+            for finger, point in enumerate(points, 1):
+                table.add_row(*(head if finger == 1 else ["", ""]), str(finger), point)
+        else:
+            table.add_row(*head, *points)
+    return table
+
+
+def _width(table: Table) -> int:
+    return Console(width=1000, height=25).measure(table).maximum
+
+
+def _is_terminal(stream: Any) -> bool:
+    return stream is not None and stream.isatty()
+
+
 def _number(name: str, text: str, kind: type) -> Any:
     try:
         return kind(text)
     except ValueError:
         wanted = "a whole number" if kind is int else "a number"
-        raise GraspModuliError(f"{name} must be {wanted}, got {text!r}") from None
+        shown = text if len(text) <= 60 else text[:57] + "..."
+        raise GraspModuliError(f"{name} must be {wanted}, got {shown!r}") from None
 
 
 @contextlib.contextmanager
@@ -377,4 +476,4 @@ def _warnings() -> Iterator[None]:
         yield
     for warning in caught:
         if issubclass(warning.category, UserWarning):
-            print(f"graspmoduli: warning: {warning.message}", file=sys.stderr)
+            _signals.say(f"warning: {warning.message}")

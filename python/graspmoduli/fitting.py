@@ -223,7 +223,8 @@ def fit(
     Raises
     ------
     GraspModuliError
-        If the file cannot be read, holds several objects, or the object is no such surface.
+        If the file cannot be read, holds several objects (parts farther apart than 3 % of the size
+        in a mesh, 8 % in a cloud of points), or the object is no such surface.
     """
     return fit_object(read(points_or_mesh_or_path), progress)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import Floats, floats
+from ._arrays import Floats, finite, numbers
 from ._core import GraspModuliError
 
 #: File name endings that can be read.
@@ -18,10 +20,20 @@ FORMATS = (".ply", ".obj", ".stl", ".glb", ".gltf", ".off", ".pcd", ".xyz", ".tx
 
 #: Fewest points of a cloud from which an axis and a surface can be estimated.
 FEWEST_POINTS = 50
-#: Parts farther apart than this, relative to the size, are objects of their own.
-GAP = 0.08
+#: Parts farther apart than this, relative to the size, are objects of their own: of a mesh, and of
+#: points, in which a gap may be what a camera did not see.
+GAP_IN_MESH, GAP_IN_CLOUD = 0.03, 0.08
 #: A part that holds less than this share of the points or area is noise, not an object.
 SMALLEST_PART = 0.05
+#: Noise of more than this share is worth a warning.
+MUCH_NOISE = 0.01
+#: Extents between which products of several lengths neither overflow nor vanish.
+LEAST_EXTENT, GREATEST_EXTENT = 1e-50, 1e50
+#: A mesh whose area is more times that of the box around it is no surface but a heap of triangles.
+MOST_AREA = 8.0
+#: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
+#: if they are 20 times longer than wide, a line.
+THICK_PLANE, THICK_LINE = 0.65, 0.35
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
 #: Points of a cloud that are used; more add nothing but time.
@@ -61,9 +73,16 @@ def read(source: Any) -> Object:
 
 def _from_file(path: Path) -> tuple[Any, Any]:
     kind = path.suffix.lower()
-    if path.is_dir():
+    try:
+        folder, exists = path.is_dir(), path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise GraspModuliError(
+            f"object must be a file that exists, got {path} ({reason})"
+        ) from None
+    if folder:
         raise GraspModuliError(f"object must be a file, got the folder {path}")
-    if not path.exists():
+    if not exists:
         raise GraspModuliError(f"object must be a file that exists, got {path}")
     if kind not in FORMATS:
         raise GraspModuliError(
@@ -79,6 +98,7 @@ def _from_file(path: Path) -> tuple[Any, Any]:
         if kind == ".pcd":
             from pypcd4.pypcd4 import PointCloud
 
+            _check_pcd(path)
             return PointCloud.from_path(path).numpy(("x", "y", "z")), None
         return _from_mesh_file(path)
     except GraspModuliError:
@@ -97,7 +117,16 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     import trimesh
 
     promised = _promised_vertices(path)
-    scene = trimesh.load_scene(path)
+    _check_text(path)
+    # As it is: vertices are neither merged nor, if not finite, dropped.
+    log = logging.getLogger("trimesh")
+    level = log.level
+    # What it cannot make sense of it would tell with a traceback.
+    log.setLevel(logging.CRITICAL)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    finally:
+        log.setLevel(level)
     meshes: list[Any] = []
     clouds: list[Any] = []
     for geometry in scene.dump():
@@ -143,10 +172,94 @@ def _promised_vertices(path: Path) -> int | None:
     return announced.get("vertex")
 
 
-def _checked(points: Any, faces: Any) -> Object:
-    array = floats("object", points)
+def _check_text(path: Path) -> None:
+    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks, or fewer rows than announced."""
+    kind = path.suffix.lower()
+    if kind not in (".off", ".obj", ".stl"):
+        return
+    with path.open("rb") as file:
+        head = file.read(512)
+        if kind == ".stl" and not (head.lstrip().startswith(b"solid") and b"facet" in head):
+            return
+        text = head + file.read()
+    name = kind[1:].upper()
+    if b"\0" in text:
+        raise GraspModuliError(f"object must be a whole {name} file, got {path} with zeroed bytes")
+    if kind == ".stl" and b"endsolid" not in text:
+        raise GraspModuliError(f"object must be a whole STL file, got {path} without its end")
+    if kind == ".stl" and text.count(b"vertex ") != 3 * text.count(b"endfacet"):
+        raise GraspModuliError(
+            f"object must be a whole STL file, got {path} with {text.count(b'vertex ')} vertices "
+            f"for {text.count(b'endfacet')} facets"
+        )
+    if kind != ".off":
+        return
+    lines = [line.split(b"#")[0].split() for line in text.splitlines()]
+    rows = [line for line in lines if line]
+    if rows and rows[0][0].upper().endswith(b"OFF"):
+        # The counts may stand in the first row.
+        rows[0] = rows[0][1:]
+        rows = rows if rows[0] else rows[1:]
+    wanted = int(rows[0][0]) + int(rows[0][1])
+    if len(rows) - 1 < wanted:
+        raise GraspModuliError(
+            f"object must be a whole OFF file, got {path} with {len(rows) - 1} of {wanted} "
+            "announced rows"
+        )
+
+
+def _check_pcd(path: Path) -> None:
+    """Refuses a PCD file with fewer points than its header announces."""
+    header: dict[bytes, list[bytes]] = {}
+    with path.open("rb") as file:
+        for line in file:
+            words = line.split()
+            if words:
+                header[words[0]] = words[1:]
+            if words[:1] == [b"DATA"]:
+                break
+        else:
+            raise GraspModuliError(f"object must be a whole PCD file, got {path} without its data")
+        wanted = int(header[b"POINTS"][0])
+        kind = header[b"DATA"][0]
+        if kind == b"ascii":
+            found = sum(1 for line in file if line.strip())
+        elif kind == b"binary":
+            sizes = [int(size) for size in header[b"SIZE"]]
+            counts = [int(count) for count in header.get(b"COUNT", [b"1"] * len(sizes))]
+            row = sum(size * count for size, count in zip(sizes, counts, strict=True))
+            found = len(file.read()) // row
+        else:
+            # A compressed block knows its own length.
+            return
+    if found < wanted:
+        raise GraspModuliError(
+            f"object must be a whole PCD file, got {path} with {found} of {wanted} announced points"
+        )
+
+
+def _without_missing(array: Floats) -> Floats:
+    """A cloud as rows, without those that are NaN throughout: pixels of a camera without depth."""
+    if array.ndim == 3 and array.shape[2] == 3:
+        array = array.reshape(-1, 3)
     if array.ndim != 2 or array.shape[1] != 3:
         raise GraspModuliError(f"object must have points of shape (n, 3), got {array.shape}")
+    missing = np.isnan(array).all(axis=1)
+    if missing.any():
+        warnings.warn(
+            f"{missing.sum():,} of {len(array):,} points are NaN, missing pixels, and left out",
+            stacklevel=4,
+        )
+    return np.ascontiguousarray(array[~missing])
+
+
+def _checked(points: Any, faces: Any) -> Object:
+    array = numbers("object", points)
+    if faces is None:
+        array = _without_missing(array)
+    elif array.ndim != 2 or array.shape[1] != 3:
+        raise GraspModuliError(f"object must have points of shape (n, 3), got {array.shape}")
+    finite("object", array)
     triangles: NDArray[np.int64] | None = None
     if faces is not None:
         triangles = np.asarray(faces)
@@ -168,6 +281,7 @@ def _checked(points: Any, faces: Any) -> Object:
         )
     if len(array) < 4:
         raise GraspModuliError(f"object must have at least 4 points, got {len(array)}")
+    _check_extent(array)
     _check_solid(array)
     if triangles is None and len(array) > MOST_POINTS:
         random = np.random.Generator(np.random.Philox(0))
@@ -190,6 +304,21 @@ def _used(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.
     return points[used], renumbered.reshape(faces.shape)
 
 
+def _check_extent(points: Floats) -> None:
+    with np.errstate(over="ignore"):
+        extent = float(np.ptp(points, axis=0).max())
+    if extent > 0.0 and not LEAST_EXTENT <= extent <= GREATEST_EXTENT:
+        raise GraspModuliError(
+            f"object must have an extent between {LEAST_EXTENT:g} and {GREATEST_EXTENT:g} in its "
+            f"own unit, got {extent:g}"
+        )
+    if 0.0 < extent < 1e-10 * float(np.abs(points).max()):
+        raise GraspModuliError(
+            f"object must be nearer to the origin, got an extent of {extent:g} at a distance of "
+            f"{float(np.abs(points).max()):g}"
+        )
+
+
 def _check_solid(points: Floats) -> None:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spread[0] == 0.0:
@@ -207,6 +336,14 @@ def _mesh_samples(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Flo
     doubled = np.linalg.norm(cross, axis=1)
     if not doubled.sum() > 0.0:
         raise GraspModuliError("object must have triangles with an area, got none")
+    a, b, c = np.ptp(points, axis=0)
+    # The area is also how often a line through the box crosses the mesh, on average.
+    heap = 0.5 * float(doubled.sum()) / (2.0 * float(a * b + b * c + c * a))
+    if heap > MOST_AREA:
+        raise GraspModuliError(
+            f"object must be a surface, got {len(faces):,} triangles with {heap:.0f} times the "
+            "area of the box around them"
+        )
     random = np.random.Generator(np.random.Philox(0))
     shares = np.cumsum(doubled) / doubled.sum()
     strata = (np.arange(SAMPLES) + random.random(SAMPLES)) / SAMPLES
@@ -229,25 +366,60 @@ def _cloud_samples(points: Floats) -> tuple[Floats, Floats]:
     samples = points[np.sort(random.choice(len(points), count, replace=False))]
     # Neighbourhoods as wide as the noise is deep: more points where there are more.
     neighbours = int(np.clip(len(points) // 150, 12, 60))
-    _, index = KDTree(points).query(samples, k=min(neighbours, len(points)))
+    index: Any = KDTree(points).query(samples, k=min(neighbours, len(points)))[1]
     around = points[index] - points[index].mean(axis=1, keepdims=True)
-    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
+    squares, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
+    # A solid looks flat from near by; a plane or a line with noise is as thick there as anywhere.
+    near = np.sqrt(np.maximum(squares[:, 0], 0.0) / index.shape[1])
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    limit = THICK_LINE if spread[1] < 0.05 * spread[0] else THICK_PLANE
+    if np.median(near) > limit * spread[2] / np.sqrt(len(points)):
+        raise GraspModuliError("object must be solid, got points on a plane or a line, with noise")
     return samples, np.ascontiguousarray(vectors[:, :, 0])
 
 
 def _check_single(thing: Object) -> None:
-    """Refuses several objects: large parts with clear space between them."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Refuses several objects, large parts with clear space between them, and tells of small ones.
+
+    Space is clear if it is wide beside the object and beside the samples' own distances.
+    """
     from scipy.spatial import KDTree
 
-    pairs = KDTree(thing.samples).query_pairs(GAP * thing.size, output_type="ndarray")
-    count = len(thing.samples)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, labels = connected_components(graph, directed=False)
-    parts = int((np.bincount(labels) > SMALLEST_PART * count).sum())
+    tree = KDTree(thing.samples)
+    distances: Any = tree.query(thing.samples, k=2)[0]
+    near = 4.0 * float(np.median(distances[:, 1]))
+
+    def shares(gap: float) -> Floats:
+        return np.sort(_parts(tree, max(gap * thing.size, near)))[::-1] / len(thing.samples)
+
+    cloud = thing.faces is None
+    apart = shares(GAP_IN_CLOUD if cloud else GAP_IN_MESH)
+    parts = int((apart > SMALLEST_PART).sum())
     if parts > 1:
         raise GraspModuliError(
             f"object must be a single one, got {parts} parts with space between them; "
             "put each into a file of its own"
         )
+    parts = int((shares(GAP_IN_MESH) > SMALLEST_PART).sum())
+    if parts > 1:
+        warnings.warn(
+            f"the object's points are in {parts} parts with a narrow space between them; "
+            "they are taken for one object",
+            stacklevel=4,
+        )
+    noise = 1.0 - float(apart[0])
+    if noise > MUCH_NOISE:
+        warnings.warn(
+            f"{noise:.1%} of the object lies apart from the rest and is taken for noise",
+            stacklevel=4,
+        )
+
+
+def _parts(tree: Any, reach: float) -> NDArray[np.int64]:
+    """Sizes of the sets of points that are connected in steps of at most ``reach``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = tree.query_pairs(reach, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(tree.n, tree.n))
+    return np.bincount(connected_components(graph, directed=False)[1])

@@ -7,6 +7,7 @@ are those of the fitted surface, divided by its length scale.
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import socket
 import threading
@@ -46,6 +47,8 @@ TRIANGLE = np.array([[1.5, 0.0, -0.75], [3.1, 0.0, -0.75], [2.3, 0.0, 0.64]])
 #: From the middle of a path's surfaces to the corner: how finely a path is drawn.
 PATH = 40
 WAYS = ("naive", "gradient", "ascent")
+#: What the sliders offer of friction and edges; they reach farther where a command asks for more.
+FRICTIONS, EDGES = (0.1, 2.0), (3, 32)
 
 
 def rgb(color: str) -> tuple[int, int, int]:
@@ -242,10 +245,11 @@ class GraspPage:
         self.text = gui.add_html("")
         steps = max(len(grasps), 1)
         self.rank = gui.add_slider("ranked grasp", 1, max(steps, 2), 1, 1, disabled=steps < 2)
-        self.friction = gui.add_slider(
-            "friction μ", 0.1, 2.0, 0.05, float(np.clip(friction, 0.1, 2.0))
-        )
-        self.edges = gui.add_slider("cone edges l", 3, 32, 1, int(np.clip(edges, 3, 32)))
+        low, high = min(FRICTIONS[0], friction), max(FRICTIONS[1], friction)
+        # A step that meets what was asked for, from an end of the range that was widened or not.
+        step = 0.05 if abs((friction - low) / 0.05 % 1.0 - 0.5) > 0.499 else 1e-3 * high
+        self.friction = gui.add_slider("friction μ", low, high, step, friction)
+        self.edges = gui.add_slider("cone edges l", EDGES[0], max(EDGES[1], edges), 1, edges)
         climb = gui.add_button("Improve this grasp (gradient ascent)")
         shown = gui.add_checkbox("object", True)
         netted = gui.add_checkbox("fitted surface", True)
@@ -327,6 +331,11 @@ class GraspPage:
             )  # fmt: skip
             self.text.content = numbers(real.quality, l, scale, push, twist)
 
+    def _worth(self, grasp: Grasp) -> float:
+        """Q_l that is shown of a grasp."""
+        mu, l = float(self.friction.value), int(self.edges.value)
+        return self.fit.in_object(grasp, friction=mu, edges=l).quality
+
     def climb(self) -> None:
         """Gradient ascent that can be watched."""
         with self.lock:
@@ -334,16 +343,17 @@ class GraspPage:
                 return
             self.climbing = True
         try:
-            best = -1.0
+            best = self._worth(self.grasp)
             for _ in range(120):
                 mu, l = float(self.friction.value), int(self.edges.value)
                 moved = transfer(
                     self.surface, self.grasp, self.surface, "gradient", friction=mu, edges=l,
                     surfaces=1, steps=4, step_length=2e-3,
                 )  # fmt: skip
-                if moved.quality <= best + 1e-7:
+                value = self._worth(moved.grasp)
+                if value <= best + 1e-7:
                     break
-                best = max(best, moved.quality)
+                best = value
                 self.show(moved.grasp)
                 time.sleep(0.03)
             # Steps of fixed length zigzag at a maximum; the last bit is by all facets at once.
@@ -351,7 +361,8 @@ class GraspPage:
                 self.surface, self.grasp, self.surface, "ascent",
                 friction=float(self.friction.value), edges=int(self.edges.value),
             )  # fmt: skip
-            if last.quality > 0.0:
+            # Never worse than the start, in the object's own coordinates, which are what is shown.
+            if self._worth(last.grasp) > best:
                 self.show(last.grasp)
         finally:
             self.climbing = False
@@ -533,7 +544,11 @@ def free_port(port: int) -> int:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", port))
-        except OSError:
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise GraspModuliError(
+                    f"port must be one that can be opened, got {port} ({error.strerror})"
+                ) from None
             raise GraspModuliError(
                 f"port must be free, got {port} in use; name another with --port, or 0 for any"
             ) from None

@@ -179,8 +179,10 @@ def test_a_drag_moves_a_contact_along_the_surface(browser, served):
         mouse.move(x, y - 6 * step)
         time.sleep(0.1)
     mouse.up()
-    wait(lambda: page.grasp != before)
-    time.sleep(0.5)
+    wait(lambda: page.grasp.u[index] > before.u[index] + 0.01)
+    wait(
+        lambda: window.quality() == pytest.approx(page.fit.in_object(page.grasp).quality, abs=1e-4)
+    )
     after = page.grasp
     # That finger went up, the others stayed.
     assert after.u[index] > before.u[index] + 0.01
@@ -224,6 +226,39 @@ def test_the_ascent_climbs(browser, served, found):
     window.page.get_by_role("button", name="Improve this grasp").click()
     wait(lambda: window.quality() > 1.1 * start)
     window.page.close()
+
+
+def test_the_ascent_never_ends_lower_than_it_starts(served, browser, found):
+    address, pages = served
+    window = ready(Window(browser, address))
+    page, fit = pages[-1], found[1]
+    for ranked in found[2]:
+        for friction in (0.3, 1.0):
+            page.friction.value = friction
+            start = fit.in_object(ranked.grasp, friction=friction).quality
+            page.show(ranked.grasp)
+            page.climb()
+            assert fit.in_object(page.grasp, friction=friction).quality >= start
+    window.page.close()
+
+
+@pytest.mark.parametrize(("friction", "edges"), [(0.05, 64), (0.77, 8), (3.3, 3)])
+def test_any_friction_and_edges_are_those_that_are_asked_for(browser, found, friction, edges):
+    server = viewer.open_server(0)
+    pages = []
+
+    @server.on_client_connect
+    def _(client):
+        pages.append(viewer.GraspPage(client, *found, friction, edges, "bottle"))
+
+    window = Window(browser, f"http://127.0.0.1:{server.get_port()}")
+    window.page.wait_for_selector("[data-quality]", timeout=60_000)
+    assert (pages[0].friction.value, pages[0].edges.value) == (friction, edges)
+    wanted = found[1].in_object(found[2][0].grasp, friction=friction, edges=edges).quality
+    wait(lambda: window.quality() == pytest.approx(wanted, abs=1e-4))
+    assert window.errors == []
+    window.page.close()
+    server.stop()
 
 
 def test_the_space_of_shapes(browser):

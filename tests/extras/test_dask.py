@@ -4,17 +4,21 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
 import graspmoduli as gm
+from graspmoduli.experiments import cluster as cluster_module
 from graspmoduli.experiments import reproduce
+from graspmoduli.experiments.store import Piece, Store
 from test_experiments import SCALES, TINY
 
 NAMES = ["fig5", "fig10", "fig11"]
 
 
 def test_a_cluster_gives_the_same_bits_whatever_becomes_of_its_workers(tmp_path, monkeypatch):
+    import dask
     from distributed import LocalCluster
 
     reproduce(NAMES, out=tmp_path / "threads", threads=2)
@@ -22,6 +26,8 @@ def test_a_cluster_gives_the_same_bits_whatever_becomes_of_its_workers(tmp_path,
     reproduce(NAMES, out=tmp_path / "local", workers=2)
     assert (tmp_path / "local" / "results.json").read_bytes() == wanted
 
+    # A scheduler of somebody else's, which gives a piece up at the first death around it.
+    dask.config.set({"distributed.scheduler.allowed-failures": 0})
     with LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
     ) as cluster:
@@ -37,6 +43,39 @@ def test_a_cluster_gives_the_same_bits_whatever_becomes_of_its_workers(tmp_path,
         reproduce(NAMES, out=out, scheduler=cluster.scheduler_address, progress=kill)
         assert killed.is_set()
         assert (out / "results.json").read_bytes() == wanted
+        # Another run on the same scheduler gets pieces of its own.
+        other = replace(TINY, seed=1)
+        for kind, options in (
+            ("alone", {"threads": 2}),
+            ("beside", {"scheduler": cluster.scheduler_address}),
+        ):
+            monkeypatch.setitem(SCALES, "quick", other)
+            reproduce(["fig5"], out=tmp_path / kind, **options)
+        texts = [(tmp_path / kind / "results.json").read_bytes() for kind in ("alone", "beside")]
+        assert texts[0] == texts[1] != wanted
+
+
+def test_a_piece_that_ends_every_worker_is_given_up(tmp_path, monkeypatch):
+    import dask
+    from distributed import LocalCluster
+
+    dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    monkeypatch.setattr(cluster_module, "MOST_DEATHS", 2)
+    with (
+        LocalCluster(
+            n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        ) as cluster,
+        Store(tmp_path, {}) as store,
+    ):
+        with pytest.raises(gm.GraspModuliError, match="workers must survive a piece, got fig8 0"):
+            cluster_module.run_on_dask(
+                [Piece("fig8", 0)], dies, TINY, store, print, cluster.scheduler_address, None
+            )
+        assert store.done() == set()
+
+
+def dies(piece, scale):
+    os._exit(1)
 
 
 @pytest.fixture(autouse=True)

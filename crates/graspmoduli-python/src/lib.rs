@@ -3,6 +3,7 @@
 
 mod domain;
 mod math;
+mod pool;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{Contact, FrictionCone};
@@ -17,6 +18,7 @@ use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
     PyReadonlyArrayDyn,
 };
+use pool::detached;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -93,8 +95,7 @@ fn quality<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, norm(each), &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.quality(&cone, norm(each), &mut out)).map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -113,8 +114,7 @@ fn quality_gradient<'py>(
     let width = Gradient::width(contacts.as_array().shape()[1]);
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![0.0; batch.centers.len() * width];
-    py.detach(|| batch.gradient(&cone, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.gradient(&cone, &mut out)).map_err(raise)?;
     PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
@@ -134,8 +134,7 @@ fn quality_at_least<'py>(
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![false; batch.centers.len()];
-    py.detach(|| batch.is_at_least(&cone, threshold, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.is_at_least(&cone, threshold, &mut out)).map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -154,7 +153,7 @@ fn extreme_quality(
 ) -> PyResult<Option<(usize, f64)>> {
     let cone = cone(friction, edges, torsion)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
-    py.detach(|| {
+    detached(py, || {
         if largest {
             batch.largest(&cone)
         } else {
@@ -177,8 +176,7 @@ fn circular_quality<'py>(
     let cone = cone(friction, 3, 0.0)?;
     let batch = batch(&contacts, &normals, &center_of_mass)?;
     let mut out = vec![[0.0; 2]; batch.centers.len()];
-    py.detach(|| batch.circular(&cone, tolerance, &mut out))
-        .map_err(raise)?;
+    detached(py, || batch.circular(&cone, tolerance, &mut out)).map_err(raise)?;
     table(py, out)
 }
 
@@ -336,7 +334,7 @@ fn sample_points<'py>(
     square: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let square = square.as_slice()?.as_chunks().0;
-    let points = py.detach(|| sampling::by_area(&surface.0, square));
+    let points = detached(py, || sampling::by_area(&surface.0, square));
     table(py, points)
 }
 
@@ -403,7 +401,7 @@ fn synthesize<'py>(
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
-    let found = py.detach(|| {
+    let found = detached(py, || {
         synthesis::synthesize(
             &surface.0,
             center_of_mass.into(),
@@ -477,7 +475,7 @@ impl PyDeformation {
     ) -> PyResult<Vec<Transferred<'py>>> {
         let cone = cone(friction, edges, 0.0)?;
         let grasps = coordinates(&grasps)?;
-        let carried = py.detach(|| self.0.naive(&grasps, &cone, samples));
+        let carried = detached(py, || self.0.naive(&grasps, &cone, samples));
         transferred(py, carried)
     }
 
@@ -502,7 +500,7 @@ impl PyDeformation {
             length,
             difference,
         };
-        let carried = py.detach(|| self.0.by_gradient(&grasps, &cone, schedule));
+        let carried = detached(py, || self.0.by_gradient(&grasps, &cone, schedule));
         transferred(py, carried)
     }
 
@@ -522,7 +520,9 @@ impl PyDeformation {
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
             .collect();
         let cells = cells(allowed.as_ref())?;
-        let carried = py.detach(|| self.0.by_ascent(&grasps, &cone, region(cells.as_ref())));
+        let carried = detached(py, || {
+            self.0.by_ascent(&grasps, &cone, region(cells.as_ref()))
+        });
         transferred(py, carried)
     }
 }
@@ -544,6 +544,14 @@ fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferre
 /// The compiled kernels of graspmoduli.
 #[pymodule]
 mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::pool::remember_process();
+        Ok(())
+    }
+
     #[pymodule_export]
     use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
     #[pymodule_export]

@@ -76,7 +76,9 @@ def worst(delta: float, index: int, scale: Scale) -> dict[str, Any]:
     good = _good(delta, scale)
 
     def smallest(epsilon: float) -> float:
-        found = worst_neighbour(good, delta, epsilon, scale.search_rounds, pole=bool(pole))
+        found = worst_neighbour(
+            good, delta, epsilon, scale.search_rounds, pole=bool(pole), cone=scale.cone
+        )
         return found.smallest
 
     if k < len(epsilons):
@@ -104,7 +106,8 @@ def _good(delta: float, scale: Scale) -> Floats:
     number = 0
     while sum(map(len, found)) < scale.search_starts:
         rows = _core.random_grasps(scale.seed, number, 200_000)
-        found.append(rows[quality(*split(rows)) >= delta])
+        value = quality(*split(rows), friction=scale.friction, edges=scale.edges)
+        found.append(rows[value >= delta])
         number += 1
     return np.concatenate(found)[: scale.search_starts]
 

@@ -103,7 +103,9 @@ def _head(configuration: dict[str, Any], seconds: float) -> str:
     return (
         f"Ours beside the paper's (Pokorny, Hang, Kragic: Grasp Moduli Spaces, RSS 2013), at the "
         f"scale “{configuration['name']}”. Computing took {seconds:,.0f} s of one core. "
-        f"Configuration: {sizes}."
+        f"Configuration: {sizes}. A number agrees statistically if it is within the paper's "
+        "rounding and four standard errors of it; in kind, if it supports the same statement, by "
+        "a threshold in the code; where there is no criterion, nothing is said."
     )
 
 

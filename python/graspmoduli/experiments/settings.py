@@ -3,6 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class Cone(NamedTuple):
+    """The friction cones of all experiments, as in the paper."""
+
+    friction: float = 1.0
+    edges: int = 8
+
+
+PAPERS_CONE = Cone()
 
 
 @dataclass(frozen=True)
@@ -28,6 +39,11 @@ class Scale:
     seed: int = 0
     friction: float = 1.0
     edges: int = 8
+
+    @property
+    def cone(self) -> Cone:
+        """Friction and edges together."""
+        return Cone(self.friction, self.edges)
 
 
 #: Three minutes on two cores, and the paper's own sizes.

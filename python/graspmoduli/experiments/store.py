@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import json
 import sqlite3
+from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from .. import _core
 from .._core import GraspModuliError
 
 
@@ -20,8 +24,24 @@ class Piece(NamedTuple):
     number: int
 
 
+@functools.cache
+def code_version() -> str:
+    """Names the code that computes: the package's version, its sources and its compiled core.
+
+    No number that somebody must remember to raise: whatever changes a result changes this.
+    """
+    package = Path(_core.__file__).parent
+    digest = hashlib.sha256(version("graspmoduli").encode())
+    for path in sorted([*package.rglob("*.py"), Path(_core.__file__)]):
+        digest.update(path.relative_to(package).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
 class Store:
     """Results of pieces, each committed by itself: what is killed loses the piece at hand, no more.
+
+    Pieces are kept by the version of the code that computed them; those of another are not used.
 
     Parameters
     ----------
@@ -44,12 +64,13 @@ class Store:
                     "CHECK (only_row = 1), text TEXT NOT NULL)"
                 )
                 connection.execute(
-                    "CREATE TABLE IF NOT EXISTS pieces (family TEXT, number INTEGER, "
-                    "result TEXT NOT NULL, seconds REAL NOT NULL, PRIMARY KEY (family, number))"
+                    "CREATE TABLE IF NOT EXISTS results (code TEXT, family TEXT, number INTEGER, "
+                    "result TEXT NOT NULL, seconds REAL NOT NULL, "
+                    "PRIMARY KEY (code, family, number))"
                 )
                 connection.execute("INSERT OR IGNORE INTO configuration VALUES (1, ?)", (wanted,))
             (found,) = self._connection.execute("SELECT text FROM configuration").fetchone()
-        except (OSError, sqlite3.Error) as error:
+        except (OSError, ValueError, sqlite3.Error) as error:
             raise self._unusable(error) from None
         if found != wanted:
             self._connection.close()
@@ -71,7 +92,9 @@ class Store:
 
     def done(self) -> set[Piece]:
         """The pieces that are there."""
-        rows = self._connection.execute("SELECT family, number FROM pieces")
+        rows = self._connection.execute(
+            "SELECT family, number FROM results WHERE code = ?", (code_version(),)
+        )
         return {Piece(*row) for row in rows}
 
     def put(self, piece: Piece, result: Any, seconds: float) -> None:
@@ -79,8 +102,8 @@ class Store:
         try:
             with self._connection as connection:
                 connection.execute(
-                    "INSERT OR REPLACE INTO pieces VALUES (?, ?, ?, ?)",
-                    (*piece, json.dumps(result), seconds),
+                    "INSERT OR REPLACE INTO results VALUES (?, ?, ?, ?, ?)",
+                    (code_version(), *piece, json.dumps(result), seconds),
                 )
         except sqlite3.Error as error:
             raise self._unusable(error) from None
@@ -88,8 +111,9 @@ class Store:
     def get(self, family: str, count: int) -> tuple[list[Any], list[float]]:
         """Results and seconds of the first pieces of a family, in order."""
         rows = self._connection.execute(
-            "SELECT result, seconds FROM pieces WHERE family = ? AND number < ? ORDER BY number",
-            (family, count),
+            "SELECT result, seconds FROM results WHERE code = ? AND family = ? AND number < ? "
+            "ORDER BY number",
+            (code_version(), family, count),
         ).fetchall()
         return [json.loads(result) for result, _ in rows], [seconds for _, seconds in rows]
 

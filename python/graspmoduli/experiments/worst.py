@@ -13,6 +13,7 @@ import numpy as np
 
 from .._arrays import Floats
 from ..quality import quality, quality_gradient
+from .settings import PAPERS_CONE, Cone
 
 #: The search keeps normals away from −e₃, where R(n) is not continuous, by this third component.
 LOWEST_NORMAL = -0.9
@@ -43,7 +44,13 @@ def join(contacts: Floats, normals: Floats, centers: Floats) -> Floats:
 
 
 def worst_neighbour(
-    good: Floats, delta: float, epsilon: float, rounds: int, *, pole: bool = False
+    good: Floats,
+    delta: float,
+    epsilon: float,
+    rounds: int,
+    *,
+    pole: bool = False,
+    cone: Cone = PAPERS_CONE,
 ) -> Worst:
     """Descends from good grasps to the worst pair (g', g) with Q(g') ≥ δ and d(g', g) ≤ ε.
 
@@ -57,15 +64,15 @@ def worst_neighbour(
     grasps, start = good, good
     if pole:
         grasps = _to_the_pole(good)
-        grasps = grasps[quality(*split(grasps)) >= delta]
-        start = _turned(grasps)
-    near, values = _descend(grasps, start, epsilon)
+        grasps = grasps[_values(grasps, cone) >= delta]
+        start = _turned(grasps, cone)
+    near, values = _descend(grasps, start, epsilon, cone)
     reach = np.full(len(grasps), 0.3 * max(epsilon, 0.01))
     for _ in range(rounds):
         if not values.min() > 0.0:
             break
-        _, down = _slope(near)
-        own, up = _slope(grasps)
+        _, down = _slope(near, cone)
+        own, up = _slope(grasps, cone)
         if pole:
             down[:, 9:12] = up[:, 9:12] = 0.0
         # Not downwards for the good grasp, unless it has quality to spare.
@@ -73,9 +80,10 @@ def worst_neighbour(
         held = (overlap > 0.0) & (own < 1.02 * delta)
         step = -(down - np.where(held, overlap, 0.0)[:, None] * up)
         step *= (reach / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
-        trial = _lifted(_retract(grasps + step), delta, pole)
-        trial_near, trial_values = _descend(trial, _retract(near + (trial - grasps)), epsilon, 3)
-        better = (quality(*split(trial)) >= delta) & (trial_values < values)
+        trial = _lifted(_retract(grasps + step), delta, pole, cone)
+        beside = _retract(near + (trial - grasps))
+        trial_near, trial_values = _descend(trial, beside, epsilon, cone, 3)
+        better = (_values(trial, cone) >= delta) & (trial_values < values)
         if not pole:
             better &= (trial[:, [11, 14, 17]] > LOWEST_NORMAL).all(1)
         grasps = np.where(better[:, None], trial, grasps)
@@ -104,8 +112,12 @@ def proven_radius(
     return float(max(left, 0.0) / speed * (1.0 - 1e-9))
 
 
-def _slope(rows: Floats) -> tuple[Floats, Floats]:
-    found = quality_gradient(*split(rows))
+def _values(rows: Floats, cone: Cone) -> Floats:
+    return np.asarray(quality(*split(rows), friction=cone.friction, edges=cone.edges))
+
+
+def _slope(rows: Floats, cone: Cone) -> tuple[Floats, Floats]:
+    found = quality_gradient(*split(rows), friction=cone.friction, edges=cone.edges)
     return found.value, join(found.contacts, found.normals, found.center_of_mass)
 
 
@@ -118,10 +130,10 @@ def _retract(rows: Floats) -> Floats:
     return join(points[:, :3], normals, points[:, 3])
 
 
-def _lifted(rows: Floats, delta: float, pole: bool) -> Floats:
+def _lifted(rows: Floats, delta: float, pole: bool, cone: Cone) -> Floats:
     """Up the gradient until Q ≥ δ, in a few Newton steps."""
     for _ in range(4):
-        value, up = _slope(rows)
+        value, up = _slope(rows, cone)
         if pole:
             up[:, 9:12] = 0.0
         short = np.maximum(delta * (1.0 + 1e-9) - value, 0.0)
@@ -132,11 +144,11 @@ def _lifted(rows: Floats, delta: float, pole: bool) -> Floats:
 
 
 def _descend(
-    grasps: Floats, start: Floats, epsilon: float, rounds: int = 12
+    grasps: Floats, start: Floats, epsilon: float, cone: Cone, rounds: int = 12
 ) -> tuple[Floats, Floats]:
     """From a start to a bad neighbour within N_ε of each grasp, and its Q."""
     near = _within(grasps, start, epsilon)
-    values, slope = _slope(near)
+    values, slope = _slope(near, cone)
     for _ in range(rounds):
         # The corner of N_ε that the linear model is least at.
         corner = _corner(grasps, slope, epsilon)
@@ -144,14 +156,14 @@ def _descend(
         best, best_values = near, values
         for share in (1.0, 0.5, 0.2, 0.05):
             trial = _within(grasps, near + share * (corner - near), epsilon)
-            trial_values = np.asarray(quality(*split(trial)))
+            trial_values = _values(trial, cone)
             wins = trial_values < best_values
             best = np.where(wins[:, None], trial, best)
             best_values = np.where(wins, trial_values, best_values)
             better |= wins
         if not better.any():
             break
-        near, (values, slope) = best, _slope(best)
+        near, (values, slope) = best, _slope(best, cone)
     return near, values
 
 
@@ -206,14 +218,14 @@ def _to_the_pole(rows: Floats) -> Floats:
     return _retract(moved)
 
 
-def _turned(rows: Floats, directions: int = 16) -> Floats:
+def _turned(rows: Floats, cone: Cone, directions: int = 16) -> Floats:
     """n₁ moved away from −e₃ by a little, in the direction that is worst for each row."""
     best, best_values = rows, np.full(len(rows), np.inf)
-    # From direction φ the cone is turned by 2φ; a polygon of 8 edges is its own after 45°.
-    for angle in np.pi / 8 * np.arange(directions) / directions:
+    # From direction φ the cone is turned by 2φ; a polygon of l edges is its own after 2π/l.
+    for angle in np.pi / cone.edges * np.arange(directions) / directions:
         trial = rows.copy()
         trial[:, 9:12] = [NEAR_POLE * np.cos(angle), NEAR_POLE * np.sin(angle), -1.0]
-        values = np.asarray(quality(*split(trial)))
+        values = _values(trial, cone)
         wins = values < best_values
         best = np.where(wins[:, None], trial, best)
         best_values = np.where(wins, values, best_values)
