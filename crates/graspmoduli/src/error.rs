@@ -15,6 +15,8 @@ pub enum Error {
     CoefficientShape(usize, usize),
     /// The heights do not satisfy bottom < top.
     Heights(f64, f64),
+    /// A radius or height of a surface is too large or too small to compute with.
+    Length(f64),
     /// A spline coefficient is not positive and finite: row (height), column (angle), value.
     Coefficient(usize, usize, f64),
     /// The coefficients do not fill the stated shape: wanted, got.
@@ -23,6 +25,10 @@ pub enum Error {
     GridTooLarge(usize, usize),
     /// A convex-cone operation with a factor that is not positive and finite.
     Weight(f64),
+    /// A relative error wanted that is not a positive number.
+    Tolerance(f64),
+    /// No bins to count in.
+    Bins(usize),
     /// The caller asked to stop.
     Interrupted,
 }
@@ -49,6 +55,11 @@ impl fmt::Display for Error {
                 out,
                 "bottom must be below top, both finite, got bottom {bottom} and top {top}"
             ),
+            Error::Length(got) => write!(
+                out,
+                "coefficients, heights and top - bottom must lie between 1e-50 and 1e50, got \
+                 {got:e}: choose another unit"
+            ),
             Error::Coefficient(row, column, value) => write!(
                 out,
                 "coefficients must be positive and finite so that the radius is positive, \
@@ -59,12 +70,14 @@ impl fmt::Display for Error {
             }
             Error::GridTooLarge(rows, columns) => write!(
                 out,
-                "surfaces must have spline grids with a small common refinement, \
-                 got one of {rows} by {columns}"
+                "surfaces must have spline grids with a common refinement of at most 8192 \
+                 intervals each way and 2 million in all, got one of {rows} by {columns}"
             ),
             Error::Weight(got) => {
                 write!(out, "weights must be positive finite numbers, got {got}")
             }
+            Error::Tolerance(got) => write!(out, "tolerance must be a positive number, got {got}"),
+            Error::Bins(got) => write!(out, "bins must be at least 1, got {got}"),
             Error::Interrupted => write!(out, "interrupted"),
         }
     }
