@@ -66,7 +66,7 @@ impl Best {
         self.at.y = self.at.y.rem_euclid(TAU);
         // It was the furthest by one of the two distances, and may be further by the other one.
         let value = self.value.max(pair.distance(self.at));
-        let left = (bound - value).max(0.0);
+        let left = (bound + pair.moved(bound) - value).max(0.0);
         SurfaceDistance {
             value,
             error: left * (1.0 + 1e-15) + 4.0 * f64::EPSILON * value,
@@ -81,10 +81,10 @@ pub fn surface_distance(
     second: &Surface,
     tolerance: f64,
 ) -> Result<SurfaceDistance, Error> {
-    if !(tolerance > 0.0) {
+    if tolerance.is_nan() || tolerance <= 0.0 {
         return Err(Error::Tolerance(tolerance));
     }
-    let pair = Pair::new(first, second)?;
+    let mut pair = Pair::new(first, second)?;
     let mut best = Best {
         value: 0.0,
         at: DVec2::ZERO,
@@ -98,17 +98,19 @@ pub fn surface_distance(
     }
     // Cells that are in the queue, and places that are free again.
     let (mut cells, mut free): (Vec<Cell>, Vec<usize>) = Default::default();
-    let patches = pair.patches().into_iter().map(|(bound, patch)| Entry {
-        bound,
-        noise: 0.0,
-        part: Part::Patch(patch),
-    });
-    let mut queue: BinaryHeap<Entry> = patches.collect();
+    let patches = pair.patches().into_iter();
+    let mut queue: BinaryHeap<Entry> = patches
+        .map(|(bound, patch)| Entry {
+            bound,
+            noise: 0.0,
+            part: Part::Patch(patch),
+        })
+        .collect();
     // What was put aside may be larger than the best by its rounding.
     let mut aside = 0.0_f64;
     let mut examined = 0;
     while let Some(Entry { bound, noise, part }) = queue.pop() {
-        let close = tolerance * best.value * (1.0 - 1e-9) + 2.0 * noise;
+        let close = tolerance * best.value * (1.0 - 1e-9) + 2.0 * noise + pair.moved(bound);
         if bound - best.value <= close || examined > MOST_CELLS {
             return Ok(best.with_bound(&pair, bound.max(aside)));
         }

@@ -22,8 +22,10 @@ pub struct Pair {
     lifts: [f64; 2],
     /// Both are surfaces of revolution: it is enough to look at one meridian.
     round: bool,
-    /// By how much the coefficients on the common grid may differ from those of the surfaces.
+    /// By how much coefficients on the common grid may differ from those of the surfaces, both
+    /// together, and by how much distances of normals do then.
     moved: f64,
+    normals_moved: f64,
 }
 
 /// A patch of the splines that was not looked at closely yet.
@@ -54,7 +56,14 @@ impl Pair {
             surfaces,
             difference,
             moved,
+            normals_moved: 0.0,
         })
+    }
+
+    /// By how much a bound of the distance on the common grid must grow to hold for the surfaces.
+    pub fn moved(&self, bound: f64) -> f64 {
+        let normals = (bound + self.normals_moved).min(FURTHEST);
+        self.moved.max(normals - bound)
     }
 
     /// Do the surfaces have the same points?
@@ -64,7 +73,7 @@ impl Pair {
     }
 
     /// All patches with bounds that take no second derivatives: cheap, and enough to put most aside.
-    pub fn patches(&self) -> Vec<(f64, Patch)> {
+    pub fn patches(&mut self) -> Vec<(f64, Patch)> {
         let (_, columns) = self.difference.shape();
         let [first, second] = &self.surfaces;
         let [one, other, apart] = [first, second, &self.difference]
@@ -79,6 +88,11 @@ impl Pair {
             let points = points + self.noise_of_points(radii).value;
             let (normals, turning) = normals_apart(ranges, self.heights);
             let normals = normals + self.noise_of_normals(radii, turning).value;
+            if self.moved > 0.0 {
+                let (along_u, along_theta) = self.slopes(radii);
+                let moved = turning * self.moved * (along_u + along_theta);
+                self.normals_moved = self.normals_moved.max(moved);
+            }
             let patch = |of| Patch {
                 number,
                 of,
@@ -138,27 +152,13 @@ impl Pair {
             ];
         }
         let b = self.surfaces[1].radius(at.x, at.y);
-        let a = b + d;
-        let [h, k] = self.heights;
-        // X of both, and X − X'.
-        let x = DVec2::new(a.slope[1] / a.value, a.slope[0] / h);
-        let y = DVec2::new(b.slope[1] / b.value, b.slope[0] / k);
-        let apart = DVec2::new(
-            (d.slope[1] - y.x * d.value) / a.value,
-            (d.slope[0] - y.y * (h - k)) / h,
-        );
-        let lengths = [x, y].map(|x| (1.0 + x.length_squared()).sqrt());
-        let [l, m] = lengths;
-        // 1/l − 1/m.
-        let shrunk = -apart.dot(x + y) / (l * m * (l + m));
-        let value = DVec3::new(
-            -shrunk,
-            apart.x / l + y.x * shrunk,
-            apart.y / l + y.y * shrunk,
-        );
-        let slopes = [(&a, x, h, l), (&b, y, k, m)].map(|(r, x, h, l)| normal_slopes(r, x, h, l));
-        let [by_u, by_theta] = [0, 1].map(|i| slopes[0][i] - slopes[1][i]);
-        [value, by_u, if self.round { DVec3::ZERO } else { by_theta }]
+        let normals = Normals::new([b + d, b], d, self.heights);
+        let by_theta = if self.round {
+            DVec3::ZERO
+        } else {
+            normals.by_theta()
+        };
+        [normals.apart, normals.by_u(), by_theta]
     }
 
     /// max(‖δ_c‖, ‖δ_n‖).
@@ -172,34 +172,40 @@ impl Pair {
         let lift = self.lifts[0].abs() + self.lifts[1].abs();
         let rounding = SUM * (apart.largest() + lift);
         Noise {
-            value: rounding + self.moved,
+            value: rounding,
             slope: 8.0 * rounding / self.patch(),
         }
     }
 
     /// The same for normals; `turning` bounds s on the patch.
-    ///
-    /// With N intervals in u and k in θ a spline of coefficients up to c has slopes up to 6 N c and
-    /// (k/π) c: the error of a slope is `SUM` times that, and so on for X and n = φ(X).
-    fn noise_of_normals(&self, [one, other, apart]: [Range; 3], turning: f64) -> Noise {
-        let (rows, columns) = self.difference.shape();
+    fn noise_of_normals(&self, radii: [Range; 3], turning: f64) -> Noise {
+        let [one, other, apart] = radii;
         let [h, k] = self.heights;
-        let (height, stretch) = (h.min(k), (h - k).abs() / h.max(k));
-        let least = one.low.min(other.low);
+        let (along_u, along_theta) = self.slopes(radii);
         let largest = one.high.max(other.high);
-        let along_u = 6.0 * (rows - 3) as f64 / height;
-        let along_theta = 4.0 * columns as f64 / (std::f64::consts::PI * least);
+        let stretch = (h - k).abs() / h.max(k);
         // X − X' is about as large as its terms at most, and they are known to `SUM` of their size.
-        let terms = along_u * (apart.largest() + largest * stretch)
-            + along_theta * apart.largest() * (largest / least);
+        let terms = along_u * (apart.largest() + largest * stretch) + along_theta * apart.largest();
         let heights = if h == k { 0.0 } else { 8.0 * f64::EPSILON };
-        let moved = self.moved * (along_u + along_theta * (largest / least));
-        // Derivatives of n are computed for each surface.
-        let steepest = turning * (along_u + along_theta * (largest / least)) * largest;
+        let value = turning * SUM * terms + heights;
+        // Derivatives multiply that by one more slope, and by one of n.
+        let steepest = turning * (along_u + along_theta) * largest;
         Noise {
-            value: (turning * (SUM * terms + moved) + heights).min(FURTHEST),
-            slope: 8.0 * SUM * steepest * (1.0 + steepest) / self.patch(),
+            value: value.min(FURTHEST),
+            slope: 32.0 * value * (1.0 + steepest) / self.patch(),
         }
+    }
+
+    /// How large f_u/H and ∂_θ ln f, and differences of them, can be on a patch, relative to the
+    /// largest coefficient: on N by k patches splines have slopes of 6 N and k/π times that.
+    fn slopes(&self, [one, other, _]: [Range; 3]) -> (f64, f64) {
+        let (rows, columns) = self.difference.shape();
+        let least = one.low.min(other.low);
+        let uneven = one.high.max(other.high) / least;
+        (
+            6.0 * (rows - 3) as f64 / self.heights[0].min(self.heights[1]),
+            4.0 * columns as f64 / (std::f64::consts::PI * least) * uneven,
+        )
     }
 
     /// Half the width of a patch.
@@ -209,20 +215,80 @@ impl Pair {
     }
 }
 
-/// Derivatives by u and θ of φ(X), √(1 + ‖X‖²) = `length`, on a surface of height `h`.
-fn normal_slopes(radius: &Radius, x: DVec2, h: f64, length: f64) -> [DVec3; 2] {
-    let Radius {
-        value: f,
-        slope: [fu, ft],
-        bend: [fuu, fut, ftt],
-    } = *radius;
-    let normal = DVec3::new(-1.0, x.x, x.y) / length;
-    let along = |p: f64, q: f64| {
-        let d = DVec3::new(0.0, p, q);
-        (d - normal * normal.dot(d)) / length
-    };
-    [
-        along(fut / f - fu * ft / (f * f), fuu / h),
-        along(ftt / f - ft * ft / (f * f), fut / h),
-    ]
+/// n − n' and its derivatives, n = φ(X), from differences throughout.
+struct Normals {
+    radii: [Radius; 2],
+    /// f − f'.
+    d: Radius,
+    heights: [f64; 2],
+    /// X = (∂_θ ln f, f_u/H), and X − X'.
+    x: [DVec2; 2],
+    x_apart: DVec2,
+    /// √(1 + ‖X‖²) of both, and the difference of their reciprocals.
+    lengths: [f64; 2],
+    shrunk: f64,
+    n: [DVec3; 2],
+    apart: DVec3,
+}
+
+impl Normals {
+    fn new(radii: [Radius; 2], d: Radius, heights: [f64; 2]) -> Self {
+        let [(a, h), (b, k)] = [(radii[0], heights[0]), (radii[1], heights[1])];
+        let x = [(a, h), (b, k)].map(|(r, h)| DVec2::new(r.slope[1] / r.value, r.slope[0] / h));
+        let x_apart = DVec2::new(
+            (d.slope[1] - x[1].x * d.value) / a.value,
+            (d.slope[0] - x[1].y * (h - k)) / h,
+        );
+        let lengths = x.map(|x| (1.0 + x.length_squared()).sqrt());
+        let [l, m] = lengths;
+        let shrunk = -x_apart.dot(x[0] + x[1]) / (l * m * (l + m));
+        let n = [0, 1].map(|i| DVec3::new(-1.0, x[i].x, x[i].y) / lengths[i]);
+        let apart = x_apart / l + x[1] * shrunk;
+        Self {
+            radii,
+            d,
+            heights,
+            x,
+            x_apart,
+            lengths,
+            shrunk,
+            n,
+            apart: DVec3::new(-shrunk, apart.x, apart.y),
+        }
+    }
+
+    fn by_u(&self) -> DVec3 {
+        let ([a, b], d, [h, k]) = (self.radii, self.d, self.heights);
+        let [first, second] = [(a, h), (b, k)].map(|(r, h)| {
+            let [fu, ft] = r.slope.map(|slope| slope / r.value);
+            DVec2::new(r.bend[1] / r.value - fu * ft, r.bend[0] / h)
+        });
+        // Of f_uθ/f, f_u/f and f_uu/H.
+        let fut = (d.bend[1] - b.bend[1] / b.value * d.value) / a.value;
+        let fu = (d.slope[0] - b.slope[0] / b.value * d.value) / a.value;
+        let fuu = (d.bend[0] - second.y * (h - k)) / h;
+        let mixed = fu * self.x[0].x + b.slope[0] / b.value * self.x_apart.x;
+        self.turned([first, second], DVec2::new(fut - mixed, fuu))
+    }
+
+    fn by_theta(&self) -> DVec3 {
+        let ([a, b], d, [h, k]) = (self.radii, self.d, self.heights);
+        let [first, second] = [(a, h), (b, k)].map(|(r, h)| {
+            let ft = r.slope[1] / r.value;
+            DVec2::new(r.bend[2] / r.value - ft * ft, r.bend[1] / h)
+        });
+        let ftt = (d.bend[2] - b.bend[2] / b.value * d.value) / a.value;
+        let fut = (d.bend[1] - second.y * (h - k)) / h;
+        let square = self.x_apart.x * (self.x[0].x + self.x[1].x);
+        self.turned([first, second], DVec2::new(ftt - square, fut))
+    }
+
+    /// Dφ(X) X_a − Dφ(X') X'_a, with Dφ(X) v = (v − n ⟨n, v⟩)/√(1 + ‖X‖²), v = (0, X_a).
+    fn turned(&self, [first, second]: [DVec2; 2], apart: DVec2) -> DVec3 {
+        let space = |v: DVec2| DVec3::new(0.0, v.x, v.y);
+        let [v, w, apart] = [first, second, apart].map(space);
+        let [n, m] = self.n;
+        let across = self.apart * n.dot(v) + m * (self.apart.dot(v) + m.dot(apart));
+        (apart - across) / self.lengths[0] + (w - m * m.dot(w)) * self.shrunk
+    }
 }
