@@ -18,6 +18,9 @@ pub struct Pair {
     /// f − f' on it.
     difference: Surface,
     pub heights: [f64; 2],
+    /// H − H', and what rounding does to it, relative to the smaller of both.
+    taller: f64,
+    taller_error: f64,
     /// Of both ends: a − a' and b − b'.
     lifts: [f64; 2],
     /// Both are surfaces of revolution: it is enough to look at one meridian.
@@ -48,10 +51,21 @@ impl Pair {
         moved += one.refinement_error(&surfaces[0]) + other.refinement_error(&surfaces[1]);
         let pairs = surfaces[0].coefficients().iter();
         let pairs = pairs.zip(surfaces[1].coefficients());
+        let heights = [first, second].map(|s| s.top() - s.bottom());
+        let lifts = [first.bottom() - second.bottom(), first.top() - second.top()];
+        // Of two ways, the one that loses less.
+        let (lift, height) = (lifts[0].abs() + lifts[1].abs(), heights[0].min(heights[1]));
+        let (taller, scale) = if lift < height {
+            (lifts[1] - lifts[0], lift)
+        } else {
+            (heights[0] - heights[1], heights[0] + heights[1])
+        };
         let difference = surfaces[0].with_coefficients(pairs.map(|(a, b)| a - b).collect());
         Ok(Self {
-            heights: [first, second].map(|s| s.top() - s.bottom()),
-            lifts: [first.bottom() - second.bottom(), first.top() - second.top()],
+            heights,
+            taller,
+            taller_error: 4.0 * f64::EPSILON * scale / height,
+            lifts,
             round: round.is_some(),
             surfaces,
             difference,
@@ -152,7 +166,7 @@ impl Pair {
             ];
         }
         let b = self.surfaces[1].radius(at.x, at.y);
-        let normals = Normals::new([b + d, b], d, self.heights);
+        let normals = Normals::new([b + d, b], d, self.heights, self.taller);
         let by_theta = if self.round {
             DVec3::ZERO
         } else {
@@ -183,11 +197,11 @@ impl Pair {
         let [h, k] = self.heights;
         let (along_u, along_theta) = self.slopes(radii);
         let largest = one.high.max(other.high);
-        let stretch = (h - k).abs() / h.max(k);
+        let stretch = self.taller.abs() / h.max(k);
         // X − X' is about as large as its terms at most, and they are known to `SUM` of their size.
         let terms = along_u * (apart.largest() + largest * stretch) + along_theta * apart.largest();
-        let heights = if h == k { 0.0 } else { 8.0 * f64::EPSILON };
-        let value = turning * SUM * terms + heights;
+        // Of X too the part that H − H' makes is at most 1/s.
+        let value = turning * SUM * terms + self.taller_error;
         // Derivatives multiply that by one more slope, and by one of n.
         let steepest = turning * (along_u + along_theta) * largest;
         Noise {
@@ -221,6 +235,8 @@ struct Normals {
     /// f − f'.
     d: Radius,
     heights: [f64; 2],
+    /// H − H'.
+    taller: f64,
     /// X = (∂_θ ln f, f_u/H), and X − X'.
     x: [DVec2; 2],
     x_apart: DVec2,
@@ -232,12 +248,12 @@ struct Normals {
 }
 
 impl Normals {
-    fn new(radii: [Radius; 2], d: Radius, heights: [f64; 2]) -> Self {
+    fn new(radii: [Radius; 2], d: Radius, heights: [f64; 2], taller: f64) -> Self {
         let [(a, h), (b, k)] = [(radii[0], heights[0]), (radii[1], heights[1])];
         let x = [(a, h), (b, k)].map(|(r, h)| DVec2::new(r.slope[1] / r.value, r.slope[0] / h));
         let x_apart = DVec2::new(
             (d.slope[1] - x[1].x * d.value) / a.value,
-            (d.slope[0] - x[1].y * (h - k)) / h,
+            (d.slope[0] - x[1].y * taller) / h,
         );
         let lengths = x.map(|x| (1.0 + x.length_squared()).sqrt());
         let [l, m] = lengths;
@@ -248,6 +264,7 @@ impl Normals {
             radii,
             d,
             heights,
+            taller,
             x,
             x_apart,
             lengths,
@@ -266,7 +283,7 @@ impl Normals {
         // Of f_uθ/f, f_u/f and f_uu/H.
         let fut = (d.bend[1] - b.bend[1] / b.value * d.value) / a.value;
         let fu = (d.slope[0] - b.slope[0] / b.value * d.value) / a.value;
-        let fuu = (d.bend[0] - second.y * (h - k)) / h;
+        let fuu = (d.bend[0] - second.y * self.taller) / h;
         let mixed = fu * self.x[0].x + b.slope[0] / b.value * self.x_apart.x;
         self.turned([first, second], DVec2::new(fut - mixed, fuu))
     }
@@ -278,7 +295,7 @@ impl Normals {
             DVec2::new(r.bend[2] / r.value - ft * ft, r.bend[1] / h)
         });
         let ftt = (d.bend[2] - b.bend[2] / b.value * d.value) / a.value;
-        let fut = (d.bend[1] - second.y * (h - k)) / h;
+        let fut = (d.bend[1] - second.y * self.taller) / h;
         let square = self.x_apart.x * (self.x[0].x + self.x[1].x);
         self.turned([first, second], DVec2::new(ftt - square, fut))
     }
