@@ -147,9 +147,10 @@ impl Surface {
         (self.coefficients.len() / self.columns, self.columns)
     }
 
-    /// f and its derivatives at (u, θ); u in [0, 1], θ any real.
+    /// f and its derivatives at (u, θ); u in [0, 1], θ any real, reduced modulo 2π.
     #[inline]
     pub fn radius(&self, u: f64, theta: f64) -> Radius {
+        let theta = reduced(theta);
         self.contract(&self.u_basis.at(u), &self.theta_basis.at(theta / TAU))
     }
 
@@ -196,6 +197,7 @@ impl Surface {
     /// In the frame e_r, e_θ, e_z that turns with θ, and with H = b − a,
     /// t₁ × t₂ = (−H f, H f_θ, f f_u): it points inward.
     pub fn place(&self, u: f64, theta: f64) -> Placed {
+        let theta = reduced(theta);
         let Radius {
             value: f,
             slope: [fu, ft],
@@ -222,6 +224,7 @@ impl Surface {
 
     /// ∂²c/∂u², ∂²c/∂u∂θ, ∂²c/∂θ².
     pub fn second_derivatives(&self, u: f64, theta: f64) -> [DVec3; 3] {
+        let theta = reduced(theta);
         let Radius {
             value: f,
             slope: [fu, ft],
@@ -526,6 +529,16 @@ impl Surface {
             farthest = farthest.max(planar.extend(self.height(u)).distance(center));
         }
         farthest
+    }
+}
+
+/// θ modulo 2π as far as that is a number, so that radius, sine and cosine are those of one angle
+/// and points lie on the surface, whatever θ.
+fn reduced(theta: f64) -> f64 {
+    if theta.abs() <= TAU {
+        theta
+    } else {
+        theta % TAU
     }
 }
 
