@@ -281,21 +281,25 @@ def test_points_lie_on_the_surface_at_any_angle(surface, turns):
         assert np.sin(turned) == pytest.approx(0.0, abs=1e-15 + 1e-16 * theta)
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-60, 1e-49, 1e-20, 1.0, 1e20, 1e49, 1e60, 1e300])
-def test_lengths_of_any_size_give_numbers_or_a_sentence(scale):
+@pytest.mark.parametrize("scale", [1e-48, 1e-20, 1.0, 1e20, 1e48])
+def test_lengths_of_any_sensible_size_give_numbers(scale):
     coefficients = scale * np.exp(np.random.default_rng(1).normal(size=(6, 5)))
     for height in (scale, 1.0):
-        try:
-            surface = gm.Surface.from_coefficients(coefficients, 0.0, height)
-        except gm.GraspModuliError as error:
-            assert not 1e-50 <= scale <= 1e50
-            assert "choose another unit" in str(error) or "infinite" in str(error)
-            continue
-        assert 1e-50 < scale < 1e50
+        surface = gm.Surface.from_coefficients(coefficients, 0.0, height)
         found = [surface.area, surface.volume, surface.center_of_mass, surface.solid_center_of_mass]
         found += [surface.normals(0.3, 1.0), *surface.tangents(0.3, 1.0)]
         assert all(np.isfinite(value).all() for value in found)
         assert np.linalg.norm(surface.normals(0.3, 1.0)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-60, 1e60, 1e300])
+def test_others_are_refused(scale):
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        gm.Surface.from_coefficients(np.full((6, 5), scale), 0.0, 1.0)
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        gm.Surface.from_coefficients(np.ones((6, 5)), 0.0, scale)
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        _ = gm.shapes.MODELS["a"] * scale
 
 
 @pytest.mark.parametrize(
@@ -308,7 +312,7 @@ def test_lengths_of_any_size_give_numbers_or_a_sentence(scale):
         (lambda u, theta: 1.0 if u > 0.5 else 2.0, r"np\.vectorize"),
         (lambda u, theta: "x", "radius must return one number per .* got a str"),
         (lambda u, theta: None, "got None"),
-        (lambda u, theta: 1j + u, "of type complex128|type complex128"),
+        (lambda u, theta: 1j + u, "type complex128"),
         (lambda u, theta: [1.0, [2.0]], "got a list"),
     ],
 )
@@ -338,7 +342,7 @@ def test_radii_that_are_none(radius, sentence):
         ),
         (
             lambda: gm.Surface.from_function(lambda u, t: np.ones(3), 0.0, 1.0),
-            "radius must return one value per",
+            "radius must return one number per",
         ),
         (
             lambda: gm.Surface.from_coefficients(np.ones((3, 8)), 0.0, 1.0),
