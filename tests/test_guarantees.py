@@ -1,5 +1,8 @@
 """Certified radii are never contradicted."""
 
+# Wrong types are passed on purpose.
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+
 import itertools
 
 import numpy as np

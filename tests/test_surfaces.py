@@ -1,5 +1,8 @@
 """Surfaces: the definition, derivatives, integrals, the convex cone, files, wrong input."""
 
+# Wrong types are passed on purpose.
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+
 import copy
 import math
 import pickle
