@@ -1,5 +1,8 @@
 """Certified radii are never contradicted."""
 
+# Wrong types are passed on purpose.
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+
 import itertools
 
 import numpy as np
@@ -80,6 +83,16 @@ def test_no_grasp_moves_further_than_the_bound():
     assert gm.transfer_bound(surfaces[0], surfaces[0]) == 0.0
 
 
+def test_nor_between_surfaces_of_revolution_and_scaled_ones():
+    rng = np.random.default_rng(84)
+    source = MODELS["a"]
+    grasp = gm.Grasp(np.append(rng.random(500), 1.0), 2 * np.pi * rng.random(501))
+    for target in (1.01 * source, 3.0 * source, MODELS["b"], 0.5 * MODELS["c"]):
+        bound = gm.transfer_bound(source, target)
+        moved = gm.placed_distance(gm.place(source, grasp), gm.place(target, grasp))
+        assert 0.9 * bound < moved <= bound
+
+
 def test_the_distance_of_surfaces_alone_is_no_bound():
     # Waves on the upper half add area there: the centre of mass moves, by more than any point.
     def waves(u, theta):
@@ -115,6 +128,19 @@ def test_what_is_not_force_closure_has_no_radius():
     assert gm.certified_radius(same) == 0.0
     with pytest.raises(gm.GraspModuliError, match="friction must be a positive"):
         gm.certified_radius(pair, friction=0.0)
+
+
+def test_wrong_types_are_said_so():
+    surface, grasp = MODELS["a"], gm.Grasp([0.5], [0.0])
+    for call, sentence in (
+        (lambda: gm.certified_radius(grasp), "placed must be a PlacedGrasp, got a Grasp"),
+        (lambda: gm.certify_transfer(None, grasp, surface), "source must be a Surface, got None"),
+        (lambda: gm.certify_transfer(surface, grasp, "a"), "target must be a Surface, got a str"),
+        (lambda: gm.certify_transfer(surface, surface, surface), "grasp must be a Grasp"),
+        (lambda: gm.transfer_bound(surface, 3), "target must be a Surface, got a int"),
+    ):
+        with pytest.raises(gm.GraspModuliError, match=sentence):
+            call()
 
 
 def test_certified_transfers_hold():

@@ -1,5 +1,11 @@
 """The Grasp Moduli Space: combinations, curves, distances."""
 
+# Wrong types are passed on purpose.
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -31,13 +37,37 @@ class TestCombinations:
     def test_surfaces_are_the_combinations(self):
         corners = [MODELS[name] for name in "aef"]
         surfaces = gm.sample_combinations(corners, 3, seed=5)
-        for surface, weights in zip(surfaces, gm.sample_weights(3, 3, seed=5), strict=True):
+        np.testing.assert_array_equal(surfaces.weights, gm.sample_weights(3, 3, seed=5))
+        for surface, weights in zip(surfaces, surfaces.weights, strict=True):
             wanted = sum(w * s.radius(0.3, 1.0) for w, s in zip(weights, corners, strict=True))
             assert surface.radius(0.3, 1.0) == pytest.approx(wanted, abs=1e-12)
+
+    def test_samples_of_the_cone_have_any_total(self):
+        weights = gm.sample_weights(3, 4000, seed=2, total=(0.5, 8.0))
+        totals = weights.sum(1)
+        assert totals.min() >= 0.5 * (1 - 1e-12)
+        assert totals.max() <= 8.0 * (1 + 1e-12)
+        # The logarithm is uniform: half are below the geometric mean.
+        assert (totals < 2.0).mean() == pytest.approx(0.5, abs=0.03)
+        np.testing.assert_allclose(weights / totals[:, None], gm.sample_weights(3, 4000, seed=2))
+        surfaces = gm.sample_combinations([MODELS["a"], MODELS["b"]], 3, total=(2.0, 2.0))
+        for surface, (first, second) in zip(surfaces, surfaces.weights, strict=True):
+            assert first + second == pytest.approx(2.0)
+            wanted = first * MODELS["a"] + second * MODELS["b"]
+            np.testing.assert_allclose(surface.coefficients, wanted.coefficients, rtol=1e-15)
+
+    def test_they_are_pickled_with_their_weights(self):
+        surfaces = gm.sample_combinations([MODELS["a"], MODELS["b"]], 3)
+        again = pickle.loads(pickle.dumps(surfaces))
+        assert again == surfaces
+        np.testing.assert_array_equal(again.weights, surfaces.weights)
 
     @pytest.mark.parametrize(
         ("options", "sentence"),
         [
+            ({"total": (2.0, 1.0)}, "total must be two positive numbers"),
+            ({"total": 0.0}, "total must be two positive numbers"),
+            ({"concentration": "x"}, "concentration must be an array of numbers"),
             ({"concentration": 0.0}, "concentration must be positive, got 0"),
             ({"concentration": [1, 2]}, "concentration must be a number or have shape"),
             ({"n": 0}, "n must be at least 1"),
@@ -80,11 +110,30 @@ class TestCurve:
         found = gm.interpolate((surface, a), (surface, b), 0.5)[1].theta[0]
         assert np.cos(found - middle) == pytest.approx(1.0, abs=1e-12)
 
+    def test_several_t_give_a_list(self):
+        start = MODELS["a"], gm.Grasp([0.1, 0.5], [0.0, 1.0])
+        end = MODELS["f"], gm.Grasp([0.2, 0.5], [0.5, 1.0])
+        points = gm.interpolate(start, end, [0.0, 0.25, 1.0])
+        assert points == [gm.interpolate(start, end, t) for t in (0.0, 0.25, 1.0)]
+        assert gm.interpolate(start, end, []) == []
+
     def test_wrong_input(self):
         point = MODELS["a"], gm.Grasp([0.5], [0.0])
         for t in (-0.1, 1.1):
             with pytest.raises(gm.GraspModuliError, match="t must lie in"):
                 gm.interpolate(point, point, t)
+        with pytest.raises(gm.GraspModuliError, match=r"t must be a number or have shape \(k,\)"):
+            gm.interpolate(point, point, np.zeros((2, 2)))
+        for wrong in (MODELS["a"], None, "ab", (MODELS["a"],), (MODELS["a"], MODELS["b"])):
+            for call in (gm.distance, lambda p, q: gm.interpolate(p, q, 0.5)):
+                with pytest.raises(
+                    gm.GraspModuliError, match=r"start must be a pair \(surface, gr"
+                ):
+                    call(wrong, point)
+                with pytest.raises(
+                    gm.GraspModuliError, match=r"end must be a pair \(surface, gras"
+                ):
+                    call(point, wrong)
         two = MODELS["a"], gm.Grasp([0.5, 0.5], [0.0, 1.0])
         with pytest.raises(gm.GraspModuliError, match="same number of contacts, got 1 and 2"):
             gm.interpolate(point, two, 0.5)
@@ -115,6 +164,130 @@ class TestPlacedDistance:
         assert gm.placed_distance(p, turned) == pytest.approx(2.0)
         with pytest.raises(gm.GraspModuliError, match="same number of contacts"):
             gm.placed_distance(p, gm.place(MODELS["a"], gm.Grasp([0.2], [0.0])))
+
+
+def revolved(rng, spread):
+    rows, columns = rng.integers(4, 12, 2)
+    coefficients = np.exp(spread * rng.normal(size=(rows, 1)))
+    bottom = rng.normal()
+    return gm.Surface.from_coefficients(
+        np.repeat(coefficients, columns, axis=1), bottom, bottom + np.exp(rng.normal())
+    )
+
+
+def patched(rng, spread, bottom=0.0, height=1.0):
+    coefficients = np.exp(spread * rng.normal(size=rng.integers(4, 10, 2)))
+    return gm.Surface.from_coefficients(coefficients, bottom, bottom + height)
+
+
+def pairs():
+    """Pairs of surfaces that are hard in one way or another."""
+    rng = np.random.default_rng(2024)
+    for spread in (0.02, 0.3, 1.0):
+        for _ in range(8):
+            yield "of revolution", revolved(rng, spread), revolved(rng, spread)
+            yield "one of revolution", revolved(rng, spread), patched(rng, spread)
+            surface = patched(rng, spread)
+            moved = 1.0 + 10.0 ** -rng.integers(1, 6) * rng.normal(size=surface.coefficients.shape)
+            yield (
+                "near",
+                surface,
+                gm.Surface.from_coefficients(surface.coefficients * abs(moved), 0.0, 1.0),
+            )
+            yield "general", patched(rng, spread), patched(rng, spread, rng.normal())
+            yield "scaled", surface, float(np.exp(rng.normal())) * surface
+        for height in (1e-3, 1e3):
+            yield f"height {height}", *(patched(rng, spread, 0.0, height) for _ in "ab")
+    for name in "abcd":
+        yield "scaled model of revolution", MODELS[name], 3.0 * MODELS[name]
+        yield "scaled model of revolution", MODELS[name], 1.01 * MODELS[name]
+    for name in "abc":
+        yield "models of revolution", MODELS["d"], MODELS[name]
+
+
+def furthest(first, second, round_):
+    """The largest distance of points and normals on a grid, and closer about the largest of it."""
+
+    def apart(u, theta):
+        points = first.points(u, theta) - second.points(u, theta)
+        normals = first.normals(u, theta) - second.normals(u, theta)
+        return np.maximum(np.linalg.norm(points, axis=-1), np.linalg.norm(normals, axis=-1))
+
+    u, theta = np.linspace(0, 1, 2001 if round_ else 91), np.array([0.3])
+    if not round_:
+        u, theta = (a.ravel() for a in np.meshgrid(u, np.linspace(0, TAU, 90)))
+    rng = np.random.default_rng(1)
+    largest = 0.0
+    for step in (0.0, 1e-2, 1e-3, 1e-4):
+        at = apart(u, theta)
+        k, largest = at.argmax(), max(largest, at.max())
+        u_best, theta_best = u[k], np.broadcast_to(theta, u.shape)[k]
+        u = np.clip(u_best + (step or 1e-2) * rng.normal(size=200), 0, 1)
+        theta = theta_best + (step or 1e-2) * rng.normal(size=200)
+    return largest
+
+
+def test_no_point_is_further_apart_than_proven_whatever_the_surfaces():
+    for kind, first, second in pairs():
+        found = gm.surface_distance(first, second)
+        largest = furthest(first, second, first.is_revolution and second.is_revolution)
+        # The grid is rounded, by more where surfaces are flat.
+        extent = max(1.0, abs(first.bottom), abs(first.top), first.coefficients.max())
+        rounding = 1e-15 * extent * (1.0 + 20.0 / min(1.0, first.top - first.bottom))
+        assert largest <= found + found.error + rounding, kind
+        at = found.u, found.theta
+        own = max(
+            np.linalg.norm(first.points(*at) - second.points(*at)),
+            np.linalg.norm(first.normals(*at) - second.normals(*at)),
+        )
+        assert own == pytest.approx(float(found), rel=1e-9, abs=rounding), kind
+        assert found.error <= 1e-6 * found + rounding or kind.startswith("height"), kind
+
+
+def test_distances_between_flat_surfaces_are_at_least_what_their_point_shows():
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        first, second = (
+            gm.Surface.from_coefficients(np.exp(rng.normal(size=(5, 5))), 0, 1e-3) for _ in "ab"
+        )
+        found = gm.surface_distance(first, second)
+        points = first.points(found.u, found.theta) - second.points(found.u, found.theta)
+        assert np.linalg.norm(points) <= found * (1 + 1e-14)
+        # Normals are never further apart than 2.
+        assert found + found.error <= max(2.0, found * (1 + 1e-6)) * (1 + 1e-9)
+
+
+def test_a_surface_written_on_a_finer_grid_is_no_further_than_rounding():
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        surface = patched(rng, 0.5)
+        rows, columns = surface.coefficients.shape
+        fine = gm.Surface.from_coefficients(np.ones((3 * (rows - 3) + 3, 2 * columns)), 0, 1)
+        # The surface as it is, on the finer grid, but for a share of 1e-30.
+        refined = gm.combine([surface, fine], [1.0, 1e-30])
+        found = gm.surface_distance(surface, refined)
+        assert found + found.error < 1e-9
+        assert gm.surface_distance(surface, surface).error == 0.0
+
+
+class TestDistancesAreValues:
+    @pytest.mark.parametrize(
+        "again", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
+    )
+    def test_copies_keep_all(self, again):
+        found = gm.surface_distance(MODELS["a"], MODELS["e"])
+        other = again(found)
+        assert type(other) is gm.SurfaceDistance
+        assert other == found
+        assert hash(other) == hash(float(found))
+        kept = "error", "u", "theta"
+        assert [getattr(other, name) for name in kept] == [getattr(found, name) for name in kept]
+
+    def test_they_do_not_change(self):
+        found = gm.surface_distance(MODELS["a"], MODELS["e"])
+        for name in ("error", "u", "value"):
+            with pytest.raises(AttributeError):
+                setattr(found, name, 0.0)
 
 
 class TestSurfaceDistance:
@@ -176,6 +349,12 @@ class TestSurfaceDistance:
     def test_wrong_input(self):
         with pytest.raises(gm.GraspModuliError, match="tolerance must lie in"):
             gm.surface_distance(MODELS["a"], MODELS["b"], tolerance=0.0)
+        with pytest.raises(gm.GraspModuliError, match="first must be a Surface, got None"):
+            gm.surface_distance(None, MODELS["b"])
+        with pytest.raises(gm.GraspModuliError, match="second must be a Surface, got a str"):
+            gm.surface_distance(MODELS["a"], "b")
+        with pytest.raises(gm.GraspModuliError, match="p must be a PlacedGrasp, got a Surface"):
+            gm.placed_distance(MODELS["a"], MODELS["a"])
 
 
 class TestDistance:
@@ -190,6 +369,14 @@ class TestDistance:
             assert gm.distance(p, p, angles=angles) == 0.0
             through = gm.distance(p, r, angles=angles) + gm.distance(r, q, angles=angles)
             assert there <= through + 1e-5
+
+    def test_carries_the_proven_error(self):
+        p = MODELS["a"], gm.Grasp([0.2, 0.5], [0.1, 1.0])
+        q = MODELS["e"], gm.Grasp([0.5, 0.5], [0.1, 1.0])
+        found, surfaces = gm.distance(p, q), gm.surface_distance(p[0], q[0])
+        assert found == surfaces + 0.3
+        assert surfaces.error <= found.error <= surfaces.error + 1e-14
+        assert pickle.loads(pickle.dumps(found)).error == found.error
 
     def test_counts_heights_and_angles(self):
         surface = MODELS["a"]

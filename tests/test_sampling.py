@@ -53,3 +53,6 @@ def test_wrong_input():
         gm.sample_points(gm.shapes.MODELS["a"], 0)
     with pytest.raises(gm.GraspModuliError, match="seed must be at least 0, got -1"):
         gm.sample_points(gm.shapes.MODELS["a"], 5, seed=-1)
+    for wrong in (None, "a", gm.shapes.MODELS):
+        with pytest.raises(gm.GraspModuliError, match="surface must be a Surface, got"):
+            gm.sample_points(wrong, 5)

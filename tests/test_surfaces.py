@@ -1,5 +1,12 @@
 """Surfaces: the definition, derivatives, integrals, the convex cone, files, wrong input."""
 
+# Wrong types are passed on purpose.
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+
+import copy
+import math
+import pickle
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -144,7 +151,7 @@ class TestConvexCone:
     @pytest.mark.parametrize(
         ("weights", "sentence"),
         [
-            ([0.5, 0.6], "weights must sum to 1, got 1.1"),
+            ([0.0, 0.0], "weights must not all be 0"),
             ([1.5, -0.5], "weights must not be negative, got -0.5"),
             ([1.0], "weights must be one per surface"),
         ],
@@ -152,6 +159,34 @@ class TestConvexCone:
     def test_wrong_weights(self, surface, weights, sentence):
         with pytest.raises(gm.GraspModuliError, match=sentence):
             gm.combine([surface, surface], weights)
+
+    def test_combinations_of_any_total_lie_in_the_cone(self, surface):
+        other = gm.shapes.MODELS["b"]
+        assert gm.combine([surface, other], [2.0, 0.5]) == 2.0 * surface + 0.5 * other
+
+    def test_sums_and_quotients(self, surface):
+        other = gm.shapes.MODELS["b"]
+        assert sum([surface, other]) == surface + other
+        assert surface / 2.0 == 0.5 * surface == surface * np.float64(0.5)
+        assert np.float64(0.5) * surface == surface / 2
+        with pytest.raises(TypeError):
+            _ = surface + 1.0
+        for wrong in (0.0, -1.0, np.nan, "x", None, np.ones(2), surface):
+            with pytest.raises(gm.GraspModuliError, match="divisor must be a positive"):
+                _ = surface / wrong
+            with pytest.raises(gm.GraspModuliError, match="factor must be a positive"):
+                _ = wrong * surface
+
+    def test_grids_whose_refinement_would_explode_are_refused(self):
+        def flat(rows, columns):
+            return gm.Surface.from_coefficients(np.ones((rows + 3, columns)), 0, 1)
+
+        # Each direction is small enough, the product is not: half a gigabyte.
+        with pytest.raises(gm.GraspModuliError, match="common refinement of at most"):
+            _ = flat(89, 91) + flat(90, 90)
+        with pytest.raises(gm.GraspModuliError, match="got one of 1 by 9797"):
+            _ = flat(1, 97) + flat(1, 101)
+        assert (flat(8, 81) + flat(9, 80)).coefficients.shape == (75, 6480)
 
     def test_factors_are_positive(self, surface):
         with pytest.raises(gm.GraspModuliError, match="factor must be a positive"):
@@ -181,9 +216,128 @@ def test_a_function_that_is_not_smooth_is_said_so():
         gm.Surface.from_function(lambda u, t: 1.0 + (u > 0.31), 0, 1, tolerance=1e-3)
 
 
+def ripples(u, theta):
+    # 0 on all lines of the first grid.
+    return 1.0 + 0.3 * np.sin(24 * np.pi * u) * np.sin(8 * theta)
+
+
+def bump(u, theta):
+    return 1.0 + 0.5 * np.exp(-(((u - 0.37) / 0.03) ** 2) - ((theta - 2.0) / 0.2) ** 2)
+
+
+@pytest.mark.parametrize("radius", [ripples, bump])
+def test_what_hides_from_the_lines_of_a_grid_is_seen(radius):
+    surface = gm.Surface.from_function(radius, 0, 1)
+    u, theta = np.random.default_rng(5).random((2, 20_000))
+    theta *= TAU
+    assert np.abs(surface.radius(u, theta) - radius(u, theta)).max() < 1.5e-6
+
+
+def test_a_surface_of_revolution_from_its_profile():
+    def profile(u):
+        return 0.4 + 0.1 * np.sin(5 * u)
+
+    surface = gm.Surface.revolution(profile, -1, 1)
+    assert surface.is_revolution
+    assert surface.coefficients.shape[1] == 4
+    u = np.linspace(0, 1, 200)
+    np.testing.assert_allclose(surface.radius(u, 3 * u), profile(u), atol=1e-6)
+    assert not gm.Surface.from_function(wavy, 0, 1).is_revolution
+    assert (1.5 * surface).is_revolution
+    assert gm.project(gm.shapes.MODELS["f"]).is_revolution
+
+
+class TestValues:
+    def test_copies_and_pickles_are_equal(self, surface):
+        for again in (
+            pickle.loads(pickle.dumps(surface)),
+            copy.copy(surface),
+            copy.deepcopy(surface),
+            gm.Surface.from_coefficients(surface.coefficients, surface.bottom, surface.top),
+        ):
+            assert again == surface
+            assert hash(again) == hash(surface)
+            assert len({again, surface}) == 1
+
+    def test_others_are_not(self, surface):
+        other = surface.coefficients.copy()
+        other[3, 3] = np.nextafter(other[3, 3], 2.0)
+        c, a, b = surface.coefficients, surface.bottom, surface.top
+        assert gm.Surface.from_coefficients(other, a, b) != surface
+        assert gm.Surface.from_coefficients(c, a, b + 1) != surface
+        assert gm.Surface.from_coefficients(c, a - 1, b) != surface
+        assert surface != "surface"
+
+    def test_signed_zeros_are_one_height(self):
+        one, other = (gm.Surface.from_coefficients(np.ones((4, 4)), z, 1) for z in (0.0, -0.0))
+        assert one == other
+        assert hash(one) == hash(other)
+
+
+@pytest.mark.parametrize("turns", [1, 1e3, 1e8, 1e15, 1e300])
+def test_points_lie_on_the_surface_at_any_angle(surface, turns):
+    theta = 1.234 * turns
+    point = surface.points(0.3, theta)
+    assert np.hypot(*point[:2]) == pytest.approx(surface.radius(0.3, theta), rel=1e-15)
+    if turns < 1e9:
+        turned = np.arctan2(point[1], point[0]) - np.arctan2(np.sin(theta), np.cos(theta))
+        assert np.sin(turned) == pytest.approx(0.0, abs=1e-15 + 1e-16 * theta)
+
+
+@pytest.mark.parametrize("scale", [1e-48, 1e-20, 1.0, 1e20, 1e48])
+def test_lengths_of_any_sensible_size_give_numbers(scale):
+    coefficients = scale * np.exp(np.random.default_rng(1).normal(size=(6, 5)))
+    for height in (scale, 1.0):
+        surface = gm.Surface.from_coefficients(coefficients, 0.0, height)
+        found = [surface.area, surface.volume, surface.center_of_mass, surface.solid_center_of_mass]
+        found += [surface.normals(0.3, 1.0), *surface.tangents(0.3, 1.0)]
+        assert all(np.isfinite(value).all() for value in found)
+        assert np.linalg.norm(surface.normals(0.3, 1.0)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-60, 1e60, 1e300])
+def test_others_are_refused(scale):
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        gm.Surface.from_coefficients(np.full((6, 5), scale), 0.0, 1.0)
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        gm.Surface.from_coefficients(np.ones((6, 5)), 0.0, scale)
+    with pytest.raises(gm.GraspModuliError, match="choose another unit"):
+        _ = gm.shapes.MODELS["a"] * scale
+
+
+@pytest.mark.parametrize(
+    ("radius", "sentence"),
+    [
+        (1.0, "radius must be a function of arrays of u and theta .* got a float"),
+        (None, "got None"),
+        (lambda u: u, "for one of u alone there is Surface.revolution"),
+        (lambda u, theta: math.sin(u), r"np\.vectorize makes functions of numbers take arrays"),
+        (lambda u, theta: 1.0 if u > 0.5 else 2.0, r"np\.vectorize"),
+        (lambda u, theta: "x", "radius must return one number per .* got a str"),
+        (lambda u, theta: None, "got None"),
+        (lambda u, theta: 1j + u, "type complex128"),
+        (lambda u, theta: [1.0, [2.0]], "got a list"),
+    ],
+)
+def test_radii_that_are_none(radius, sentence):
+    with pytest.raises(gm.GraspModuliError, match=sentence):
+        gm.Surface.from_function(radius, 0.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
+        (lambda: gm.Surface(wavy, 0.0, 1.0), "surfaces are made by Surface.from_function"),
+        (lambda: gm.Surface.revolution(wavy, 0.0, 1.0), "there is Surface.from_function"),
+        (lambda: gm.Surface.revolution(0.5, 0.0, 1.0), "radius must be a function of arrays of u"),
+        (lambda: gm.combine(gm.shapes.MODELS["a"], [1]), "must be a list of surfaces"),
+        (lambda: gm.combine([gm.shapes.MODELS["a"], None], [1, 1]), r"surfaces\[1\] must be"),
+        (lambda: gm.combine(None, [1]), "surfaces must be a list of surfaces, got None"),
+        (lambda: gm.project("bottle"), "surface must be a Surface, got a str"),
+        (lambda: gm.closest_combination(None, []), "surface must be a Surface, got None"),
+        (lambda: gm.shapes.MODELS["a"].coordinates([1e200, 0, 0]), "coordinates up to 1e"),
+        (lambda: gm.shapes.MODELS["a"].save(None), "path must be a file that can be written"),
+        (lambda: gm.Surface.load(None), "path must be a file written by"),
         (lambda: gm.Surface.from_function(wavy, 1.0, 0.0), "bottom must be below top"),
         (
             lambda: gm.Surface.from_function(lambda u, t: u - 0.5, 0.0, 1.0),
@@ -191,7 +345,7 @@ def test_a_function_that_is_not_smooth_is_said_so():
         ),
         (
             lambda: gm.Surface.from_function(lambda u, t: np.ones(3), 0.0, 1.0),
-            "radius must return one value per",
+            "radius must return one number per",
         ),
         (
             lambda: gm.Surface.from_coefficients(np.ones((3, 8)), 0.0, 1.0),

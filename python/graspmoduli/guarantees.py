@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arrays import cone
+from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp, place
 from .moduli import surface_distance
 from .quality import circular_quality
-from .surfaces import Surface
+from .surfaces import Surface, _what, a_surface
 
 #: How far the bounds of the circular quality are driven together, relative to the upper one.
 TOLERANCE = 1e-2
@@ -38,6 +39,8 @@ def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int =
     float
         0 if the grasp is not force closure even with the inscribed cones.
     """
+    if not isinstance(placed, PlacedGrasp):
+        raise GraspModuliError(f"placed must be a PlacedGrasp, got {_what(placed)}")
     mu, l = cone(friction, edges)
     inscribed = mu * np.cos(np.pi / l)
     center = placed.contacts.mean(0)
@@ -81,8 +84,9 @@ def certify_transfer(
 ) -> Certificate:
     """Is the naïve transfer of a grasp proven to be force closure? (Sec. III, Lemma III.5)
 
-    By the lemma contacts and normals move no further than d(S, T); here by how far they do. Not
-    certified does not mean lost.
+    By the lemma no contact and no normal moves further than d(S, T). How far those of this grasp
+    move is computed, which is less, and compared with its certified radius. A grasp that is not
+    certified may hold all the same.
 
     Parameters
     ----------
@@ -91,7 +95,10 @@ def certify_transfer(
     friction, edges
         As in :func:`graspmoduli.quality`, positive.
     """
-    p, q = place(source, grasp), place(target, grasp)
+    if not isinstance(grasp, Grasp):
+        raise GraspModuliError(f"grasp must be a Grasp, got {_what(grasp)}")
+    p = place(a_surface("source", source), grasp)
+    q = place(a_surface("target", target), grasp)
     moved = [
         np.linalg.norm(p.contacts - q.contacts, axis=1).max(),
         np.linalg.norm(p.normals - q.normals, axis=1).max(),
@@ -103,11 +110,14 @@ def certify_transfer(
 def transfer_bound(source: Surface, target: Surface) -> float:
     """No grasp moves further than this by the naïve transfer (Lemma III.5): d(g, g') ≤ bound.
 
-    The paper's bound is d(S, T), which as defined does not see the centre of mass; as d(g, g')
-    does, the larger of d(S, T), with its error, and ‖z_S − z_T‖ is the bound that holds
-    (docs/mathematics.md shows surfaces for which d(S, T) alone does not).
+    The paper's bound is d(S, T). That is the distance of points and normals, while d(g, g') counts
+    the centre of mass too, which can move further (docs/mathematics.md has surfaces with which it
+    does). The bound here is the larger of d(S, T), with its error, and ‖z_S − z_T‖, z as in
+    :attr:`Surface.center_of_mass`.
     """
-    apart = surface_distance(source, target)
+    apart = surface_distance(a_surface("source", source), a_surface("target", target))
     moved = np.linalg.norm(source.center_of_mass - target.center_of_mass)
-    # Rounding, in the points and normals themselves.
-    return max(apart + apart.error, float(moved)) * (1.0 + 1e-12)
+    # Rounding of the points and normals that a grasp is placed with.
+    extent = max(np.abs([s.bottom, s.top]).max() + s.coefficients.max() for s in (source, target))
+    rounding = 1e-12 * max(apart, float(moved)) + (4e-15 * extent if apart > 0.0 else 0.0)
+    return max(apart + apart.error, float(moved)) + rounding

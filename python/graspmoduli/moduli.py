@@ -2,24 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, count, floats, number
+from ._arrays import Floats, count, floats, locked, number
 from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp
-from .surfaces import Surface, combine
+from .surfaces import Surface, _what, a_surface, combine, some_surfaces
 
 #: A point of the Grasp Moduli Space: a surface and a grasp on it.
 Point = tuple[Surface, Grasp]
 
 
-def sample_weights(surfaces: int, n: int, seed: int = 0, concentration: ArrayLike = 1.0) -> Floats:
-    """Barycentric coordinates from a Dirichlet distribution, to combine surfaces with.
+class Combinations(list[Surface]):
+    """Surfaces with the weights that they were combined with, ``weights``. Shape (n, k)."""
+
+    weights: Floats
+
+    def __init__(self, surfaces: Iterable[Surface], weights: Floats) -> None:
+        super().__init__(surfaces)
+        self.weights = locked(weights)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Combinations, (list(self), self.weights.copy())
+
+
+def sample_weights(
+    surfaces: int,
+    n: int,
+    seed: int = 0,
+    concentration: ArrayLike = 1.0,
+    *,
+    total: tuple[float, float] | None = None,
+) -> Floats:
+    """Random weights to combine surfaces with: barycentric coordinates, or times a factor.
 
     Parameters
     ----------
@@ -30,13 +50,17 @@ def sample_weights(surfaces: int, n: int, seed: int = 0, concentration: ArrayLik
     seed
         The same seed gives the same bits.
     concentration
-        Positive parameter of the distribution, one for all or one per surface: 1 is uniform on the
-        simplex, less prefers its corners, more its middle.
+        Parameter α of the Dirichlet distribution that barycentric coordinates are drawn from,
+        positive, one for all or one per surface: 1 is uniform on the simplex, less prefers its
+        corners, more its middle.
+    total
+        If given, what each row sums to is drawn between these two positive numbers, its logarithm
+        uniformly: then combinations lie in the convex cone of the surfaces.
 
     Returns
     -------
     array of shape (n, surfaces)
-        Rows are not negative and sum to 1.
+        Rows are not negative and sum to 1 if no ``total`` is given, to rounding.
     """
     k = count("surfaces", surfaces, 1)
     alpha = floats("concentration", concentration)
@@ -46,34 +70,92 @@ def sample_weights(surfaces: int, n: int, seed: int = 0, concentration: ArrayLik
         )
     if (alpha <= 0.0).any():
         raise GraspModuliError(f"concentration must be positive, got {alpha.min()}")
+    rows = count("n", n, 1)
     generator = np.random.Generator(np.random.Philox(count("seed", seed, 0)))
-    return generator.dirichlet(np.broadcast_to(alpha, (k,)), count("n", n, 1))
+    weights = generator.dirichlet(np.broadcast_to(alpha, (k,)), rows)
+    if not np.isfinite(weights).all() or (weights.sum(axis=1) < 0.5).any():
+        raise GraspModuliError(
+            f"concentration must lie between about 1e-2 and 1e300, got {alpha.tolist()}"
+        )
+    if total is None:
+        return weights
+    ends = floats("total", total)
+    if ends.shape != (2,) or not 0.0 < ends[0] <= ends[1]:
+        raise GraspModuliError(
+            f"total must be two positive numbers, the smaller first, got {ends.tolist()}"
+        )
+    low, high = np.log(ends)
+    return weights * np.exp(low + (high - low) * generator.random((rows, 1)))
 
 
 def sample_combinations(
-    surfaces: Sequence[Surface], n: int, seed: int = 0, *, concentration: ArrayLike = 1.0
-) -> list[Surface]:
-    """Random surfaces of Conv(X), X the given ones (Sec. III), by :func:`sample_weights`."""
-    return [
-        combine(surfaces, weights)
-        for weights in sample_weights(len(surfaces), n, seed, concentration)
-    ]
+    surfaces: Sequence[Surface],
+    n: int,
+    seed: int = 0,
+    *,
+    concentration: ArrayLike = 1.0,
+    total: tuple[float, float] | None = None,
+) -> Combinations:
+    """Random surfaces of Conv(X), X the given ones (Sec. III), or with ``total`` of their cone.
+
+    A list of ``n`` surfaces, with the weights of :func:`sample_weights` that they were made with
+    as its ``weights``. Parameters are those of that function.
+    """
+    given = some_surfaces("surfaces", surfaces)
+    weights = sample_weights(len(given), n, seed, concentration, total=total)
+    return Combinations((combine(given, row) for row in weights), weights)
 
 
-def interpolate(start: Point, end: Point, t: float) -> Point:
+@overload
+def interpolate(start: Point, end: Point, t: float) -> Point: ...
+@overload
+def interpolate(start: Point, end: Point, t: Sequence[float] | Floats) -> list[Point]: ...
+def interpolate(start: Point, end: Point, t: ArrayLike) -> Point | list[Point]:
     """The point at t on the curve of Eq. (III.1) between two points of the Grasp Moduli Space.
 
     Surface and heights go straight, angles along the shorter arc; exactly opposite ones straight
-    from θ to θ' in [0, 2π), as in the paper. ``t`` lies in [0, 1].
+    from θ to θ' in [0, 2π), as in the paper.
+
+    Parameters
+    ----------
+    start, end
+        A surface and a grasp on it, each: ``(surface, grasp)``.
+    t
+        In [0, 1]: a number, or several of shape (k,).
+
+    Returns
+    -------
+    (Surface, Grasp), or a list of k for several t
     """
-    (first, g), (last, h) = start, end
-    share = number("t", t)
-    if not 0.0 <= share <= 1.0:
-        raise GraspModuliError(f"t must lie in [0, 1], got {share}")
+    (first, g), (last, h) = a_point("start", start), a_point("end", end)
+    shares = floats("t", t)
+    if shares.ndim > 1:
+        raise GraspModuliError(f"t must be a number or have shape (k,), got {shares.shape}")
+    if ((shares < 0.0) | (shares > 1.0)).any():
+        outside = shares[(shares < 0.0) | (shares > 1.0)].flat[0]
+        raise GraspModuliError(f"t must lie in [0, 1], got {outside}")
     turn = shortest_turn(g, h)
-    u = np.clip((1.0 - share) * g.u + share * h.u, 0.0, 1.0)
-    surface = combine([first, last], [1.0 - share, share])
-    return surface, Grasp(u, g.theta + share * turn)
+
+    def at(share: float) -> Point:
+        u = np.clip((1.0 - share) * g.u + share * h.u, 0.0, 1.0)
+        surface = combine([first, last], [1.0 - share, share])
+        return surface, Grasp(u, g.theta + share * turn)
+
+    if not shares.ndim:
+        return at(float(shares))
+    return [at(share) for share in shares.tolist()]
+
+
+def a_point(name: str, value: Any) -> Point:
+    """``value`` if it is a point of the moduli space, a surface and a grasp on it."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise GraspModuliError(f"{name} must be a pair (surface, grasp), got {_what(value)}")
+    surface, grasp = value
+    if not isinstance(surface, Surface) or not isinstance(grasp, Grasp):
+        raise GraspModuliError(
+            f"{name} must be a pair (surface, grasp), got {_what(surface)} and {_what(grasp)}"
+        )
+    return surface, grasp
 
 
 def shortest_turn(g: Grasp, h: Grasp) -> Floats:
@@ -87,6 +169,9 @@ def shortest_turn(g: Grasp, h: Grasp) -> Floats:
 def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     """d(g, g') of Sec. III: the largest distance between corresponding contacts, normals and
     centres of mass."""
+    for name, value in (("p", p), ("q", q)):
+        if not isinstance(value, PlacedGrasp):
+            raise GraspModuliError(f"{name} must be a PlacedGrasp, got {_what(value)}")
     same_number(p, q)
     return max(
         float(np.linalg.norm(p.contacts - q.contacts, axis=1).max()),
@@ -95,21 +180,54 @@ def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     )
 
 
-class SurfaceDistance(float):
-    """d(S, S'), a number with a proven error bound.
+class Distance(float):
+    """A distance with a proven error bound: the true one is at most ``error`` larger.
 
-    It is attained at (``u``, ``theta``), and the supremum is at most ``error`` larger.
+    It compares, adds and hashes as the number that it is.
     """
 
+    __slots__ = ("error",)
     error: float
+
+    def __new__(cls, value: float, error: float) -> Distance:
+        """As :func:`distance` makes it."""
+        self = super().__new__(cls, value)
+        object.__setattr__(self, "error", float(error))
+        return self
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a distance does not change: cannot set {name}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (float(self), self.error)
+
+    def __copy__(self) -> Distance:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Distance:
+        return self
+
+
+class SurfaceDistance(Distance):
+    """d(S, S'), a number with a proven error bound.
+
+    It is the distance of the points or normals at (``u``, ``theta``), to its own rounding, and the
+    supremum is at most ``error`` larger.
+    """
+
+    __slots__ = ("theta", "u")
     u: float
     theta: float
 
     def __new__(cls, value: float, error: float, u: float, theta: float) -> SurfaceDistance:
         """As :func:`surface_distance` makes it."""
-        self = super().__new__(cls, value)
-        self.error, self.u, self.theta = error, u, theta
+        self = super().__new__(cls, value, error)
+        object.__setattr__(self, "u", float(u))
+        object.__setattr__(self, "theta", float(theta))
         return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SurfaceDistance, (float(self), self.error, self.u, self.theta)
 
 
 def surface_distance(
@@ -117,14 +235,16 @@ def surface_distance(
 ) -> SurfaceDistance:
     """d(S, S') of Sec. III: the supremum of max(‖c_S − c_S'‖, ‖n_S − n_S'‖) over (u, θ).
 
-    By branch and bound, so the error is proven, not estimated. ``tolerance``, from 1e-9 to 1, is
-    the relative error wanted; look at ``error`` where surfaces are as hard to tell apart as no
-    million cells can.
+    By branch and bound, so the error is proven, not estimated, and covers rounding. ``tolerance``,
+    from 1e-9 to 1, is the relative error wanted. Look at ``error``: it is larger where no million
+    cells can tell the supremum so well, as for very flat surfaces, and where rounding does not
+    allow it, as for surfaces that are nearly equal.
     """
     wanted = number("tolerance", tolerance)
     if not 1e-9 <= wanted <= 1.0:
         raise GraspModuliError(f"tolerance must lie in [1e-9, 1], got {wanted}")
-    value, error, (u, theta) = _core.surface_distance(first._core, second._core, wanted)
+    one, other = a_surface("first", first), a_surface("second", second)
+    value, error, (u, theta) = _core.surface_distance(one._core, other._core, wanted)
     return SurfaceDistance(value, error, u, theta)
 
 
@@ -132,18 +252,21 @@ def surface_distance(
 ANGLES = ("chord", "arc")
 
 
-def distance(start: Point, end: Point, *, angles: str = "chord") -> float:
+def distance(start: Point, end: Point, *, angles: str = "chord") -> Distance:
     """The metric of the Grasp Moduli Space: d(S, S') + Σ |u_i − u'_i| + Σ d(θ_i, θ'_i) (Sec. III).
 
-    ``angles`` are measured by their ``"chord"``, as in the paper, or by their ``"arc"``.
+    A number with a proven ``error``: that of :func:`surface_distance`, and rounding. ``start`` and
+    ``end`` are pairs ``(surface, grasp)``; ``angles`` are measured by their ``"chord"``, as in the
+    paper, or by their ``"arc"``.
     """
-    if angles not in ANGLES:
+    if not isinstance(angles, str) or angles not in ANGLES:
         raise GraspModuliError(f'angles must be "chord" or "arc", got {angles!r}')
-    (first, g), (last, h) = start, end
+    (first, g), (last, h) = a_point("start", start), a_point("end", end)
     arc = np.abs(shortest_turn(g, h))
     apart = arc if angles == "arc" else 2.0 * np.sin(0.5 * arc)
-    heights = np.abs(g.u - h.u)
-    return float(surface_distance(first, last) + heights.sum() + apart.sum())
+    rest = float(np.abs(g.u - h.u).sum() + apart.sum())
+    surfaces = surface_distance(first, last)
+    return Distance(surfaces + rest, surfaces.error + 1e-15 * len(g) * rest)
 
 
 def same_number(first: Any, second: Any) -> None:

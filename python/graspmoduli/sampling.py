@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import Floats, count, locked
-from .surfaces import Surface
+from .surfaces import Surface, a_surface
 
 
 def sample_points(surface: Surface, n: int, seed: int = 0) -> tuple[Floats, Floats]:
@@ -15,14 +15,17 @@ def sample_points(surface: Surface, n: int, seed: int = 0) -> tuple[Floats, Floa
     The unit square is cut into n cells of equal area, one point is drawn in each, and the points
     are mapped to the surface so that equal areas go to equal areas: u by the marginal
     distribution of the area density ‖t₁ × t₂‖, θ by the conditional one, both inverted by
-    bisection.
+    bisection to 1e-9 of a grid interval. Areas are those of Simpson's rule with two steps per
+    spline interval, at least 60: to 1e-4 on smooth surfaces, to a few percent beside spikes as
+    narrow as an interval.
 
     Returns
     -------
     u, theta
         Each of shape (n,), read-only. The same seed gives the same bits.
     """
-    points = _core.sample_points(surface._core, unit_square(count("n", n, 1), seed))
+    core = a_surface("surface", surface)._core
+    points = _core.sample_points(core, unit_square(count("n", n, 1), seed))
     return locked(points[:, 0].copy()), locked(points[:, 1].copy())
 
 

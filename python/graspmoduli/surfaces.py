@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +19,10 @@ from ._files import replacing
 
 #: Spline intervals per direction at which ``Surface.from_function`` gives up refining.
 FINEST_GRID = 512
+#: Scattered points at which it compares at least, and how many per cell of the grid.
+SCATTERED, PER_CELL = 2**14, 2
+#: Points further away than this have no coordinates: the square of a distance would overflow.
+FARTHEST = 1e100
 
 
 class SecondDerivatives(NamedTuple):
@@ -32,18 +37,29 @@ class Surface:
     """S = {(f cos θ, f sin θ, (1 − u) a + u b)}: heights a < b, radius f(u, θ) > 0.
 
     f is a tensor product of uniform cubic B-splines, clamped in u ∈ [0, 1] and periodic in θ
-    [rad]. All its coefficients are positive, so f > 0 everywhere. Surfaces form a convex cone
-    (Lemma III.1): ``2.0 * S + 0.5 * T`` is exact, whatever the two grids.
+    [rad]. All its coefficients are positive, so f > 0 everywhere; radii and heights lie between
+    1e-50 and 1e50. Surfaces form a convex cone (Lemma III.1): ``2.0 * S + 0.5 * T``, ``S / 2.0``
+    and ``sum([S, T])`` are exact to rounding, on the coarsest grid that refines both. (A sum is
+    refused if that has more than 8192 intervals in a direction or 2 million coefficients.)
 
-    Make one with :meth:`from_function`, :meth:`from_coefficients`, :meth:`load` or
-    :func:`graspmoduli.fit`. Surfaces do not change.
+    Make one with :meth:`from_function`, :meth:`revolution`, :meth:`from_coefficients`,
+    :meth:`load` or :func:`graspmoduli.fit`. Surfaces do not change; they are equal if heights and
+    coefficients are.
     """
 
     __slots__ = ("_core",)
     _core: _core.Surface
+    # NumPy leaves products with its numbers and arrays to this class.
+    __array_ufunc__ = None
 
-    def __init__(self, core: _core.Surface) -> None:
-        self._core = core
+    def __init__(self, *core: _core.Surface) -> None:
+        if len(core) != 1 or not isinstance(core[0], _core.Surface):
+            raise GraspModuliError(
+                "surfaces are made by Surface.from_function(radius, bottom, top), "
+                "Surface.revolution, Surface.from_coefficients or Surface.load, "
+                f"got {len(core)} arguments for Surface itself"
+            )
+        self._core = core[0]
 
     @classmethod
     def from_function(
@@ -63,51 +79,94 @@ class Surface:
         bottom, top
             Heights a < b.
         tolerance
-            Largest error of the radius, relative to the largest radius. The grid is refined
-            until it is met; a warning says so if 512 intervals are not enough.
+            Largest error of the radius, relative to the largest radius, at the points where
+            spline and function are compared: five between neighbouring sites of the grid in each
+            direction, and 16,384 points or two per cell, whichever is more, spread evenly over
+            the (u, θ) rectangle. The grid is refined until it is met there; a warning says so if
+            512 intervals are not enough. What lies between all of these points, such as a bump
+            of less than a hundredth of the rectangle in both directions, is not seen.
         """
+        call = _caller(radius, 2, "u and theta", "for one of u alone there is Surface.revolution")
+        return cls._interpolated(call, bottom, top, tolerance)
+
+    @classmethod
+    def revolution(
+        cls,
+        radius: Callable[[Floats], ArrayLike],
+        bottom: float,
+        top: float,
+        *,
+        tolerance: float = 1e-6,
+    ) -> Surface:
+        """The surface of revolution of a radius function.
+
+        Parameters
+        ----------
+        radius
+            ``radius(u)``, positive, for arrays.
+        bottom, top, tolerance
+            As in :meth:`from_function`.
+        """
+        call = _caller(radius, 1, "u", "for one of u and theta there is Surface.from_function")
+        return cls._interpolated(lambda u, theta: call(u), bottom, top, tolerance)
+
+    @classmethod
+    def _interpolated(
+        cls, radius: Callable[[Floats, Floats], Any], bottom: float, top: float, tolerance: float
+    ) -> Surface:
         a, b = _heights(bottom, top)
         tolerance = number("tolerance", tolerance, positive=True)
 
-        def sample(u: Floats, theta: Floats) -> Floats:
-            us, thetas = np.meshgrid(u, theta, indexing="ij")
-            values = np.asarray(radius(us, thetas), dtype=np.float64)
+        def at(us: Floats, thetas: Floats) -> Floats:
+            returned = radius(us, thetas)
             try:
-                values = np.broadcast_to(values, us.shape)
-            except ValueError:
+                values = np.asarray(returned)
+                if values.dtype.kind not in "biuf":
+                    raise TypeError
+                values = np.broadcast_to(values.astype(np.float64), us.shape)
+            except (TypeError, ValueError):
                 raise GraspModuliError(
-                    f"radius must return one value per (u, theta), "
-                    f"got shape {values.shape} for {us.shape}"
+                    f"radius must return one number per (u, theta), "
+                    f"got {_what(returned)} for {us.shape}"
                 ) from None
             wrong = ~(np.isfinite(values) & (values > 0.0))
             if wrong.any():
-                i, j = np.argwhere(wrong)[0]
+                first = tuple(np.argwhere(wrong)[0])
                 raise GraspModuliError(
-                    f"radius must be positive and finite, got {values[i, j]} "
-                    f"at u = {u[i]:.6g}, theta = {theta[j]:.6g}"
+                    f"radius must be positive and finite, got {values[first]} "
+                    f"at u = {us[first]:.6g}, theta = {thetas[first]:.6g}"
                 )
             return values
 
-        # Offsets without a common divisor, so that no pattern falls between all of them.
+        def sample(u: Floats, theta: Floats) -> Floats:
+            us, thetas = np.meshgrid(u, theta, indexing="ij")
+            return at(us, thetas)
+
+        # Between the sites of one direction, where only that one is interpolated.
         offsets = np.array([0.137, 0.319, 0.5, 0.682, 0.891])
         rows, columns = 8, 8
         while True:
             u, theta = _greville(rows), 2 * np.pi * np.arange(columns) / columns
             coefficients = _core.interpolate(np.ascontiguousarray(sample(u, theta)))
             scale = float(coefficients.max())
+            bar = tolerance * scale
             fine_u = ((np.arange(rows)[:, None] + offsets) / rows).ravel()
             fine_theta = ((np.arange(columns)[:, None] + offsets) * 2 * np.pi / columns).ravel()
-            # At the sites of one direction only the other one is interpolated.
-            error_u = _error(coefficients, sample(fine_u, theta), fine_u, theta)
-            error_theta = _error(coefficients, sample(u, fine_theta), u, fine_theta)
-            bar = tolerance * scale
+            error_u = _error(coefficients, sample, fine_u, theta)
+            error_theta = _error(coefficients, sample, u, fine_theta)
+            error = max(error_u, error_theta)
             refine_u = error_u > bar and rows < FINEST_GRID
             refine_theta = error_theta > bar and columns < FINEST_GRID
-            positive = bool((coefficients > 0.0).all())
-            if not positive and not (refine_u or refine_theta):
+            if not (refine_u or refine_theta):
+                # What vanishes on all lines of the grid, as products of ripples can.
+                scattered = _scattered(max(SCATTERED, PER_CELL * rows * columns))
+                off = _values(coefficients, *scattered) - at(*scattered)
+                error = max(error, float(np.abs(off).max()))
+                low = float(coefficients.min())
                 # The control net lies above the surface once the grid is fine enough.
-                refine_u, refine_theta = rows < FINEST_GRID, columns < FINEST_GRID
-                if not (refine_u or refine_theta):
+                if error > bar or low <= 0.0:
+                    refine_u, refine_theta = rows < FINEST_GRID, columns < FINEST_GRID
+                if low <= 0.0 and not (refine_u or refine_theta):
                     raise GraspModuliError(
                         "radius must stay clear of 0 for a spline to represent it, "
                         f"got {float(sample(fine_u, theta).min()):.3g} "
@@ -116,16 +175,15 @@ class Surface:
             if not (refine_u or refine_theta):
                 break
             rows, columns = rows * (1 + refine_u), columns * (1 + refine_theta)
-        error = max(error_u, error_theta)
         if error > bar:
             warnings.warn(
                 f"the radius is represented to {error / scale:.1e} of its largest value, not to "
                 f"the tolerance {tolerance:.1e}: it is not smooth enough for the finest grid",
-                stacklevel=2,
+                stacklevel=3,
             )
         if np.ptp(coefficients, axis=1).max() <= 1e-14 * scale:
             # A surface of revolution needs no more than the smallest periodic spline.
-            coefficients = coefficients[:, :4]
+            coefficients = np.repeat(coefficients[:, :1], 4, axis=1)
         return cls.from_coefficients(coefficients, a, b)
 
     @classmethod
@@ -158,10 +216,23 @@ class Surface:
         """Spline coefficients. Shape (n, k), read-only."""
         return locked(self._core.coefficients)
 
+    @property
+    def is_revolution(self) -> bool:
+        """Whether the radius is the same all around, to 1e-14 of the largest coefficient."""
+        return self._core.is_revolution
+
     # Points -------------------------------------------------------------------------------
 
-    def radius(self, u: ArrayLike, theta: ArrayLike) -> Any:
-        """f(u, θ). Shape of the arguments broadcast; a float for numbers."""
+    @overload
+    def radius(self, u: float, theta: float) -> float: ...
+    @overload
+    def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats: ...
+    def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats | float:
+        """f(u, θ). Shape of the arguments broadcast; a float for numbers.
+
+        Here and below u lies in [0, 1] and θ is any real number. It is reduced modulo 2π first,
+        which turns points along the surface by up to 1e-16 θ.
+        """
         us, thetas, shape = coordinates(u, theta)
         values = self._core.radius(us, thetas)[:, 0]
         return values.reshape(shape) if shape else float(values[0])
@@ -194,15 +265,17 @@ class Surface:
         return self._core.place(us, thetas).reshape((*shape, 9, 3))
 
     def coordinates(self, points: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """The nearest contact coordinates to points in space.
+        """Contact coordinates of a nearest point of the surface to points in space.
 
-        From the nearest point of a grid of 64 by 128 by Newton's method on the surface, u kept in
-        [0, 1]; to rounding where the nearest point is unique and the grid finds its valley.
+        By Newton's method on the surface, u kept in [0, 1], from the nearest point of a grid of 64
+        by 128: a point to which none nearby is nearer. It is the nearest of all where that lies in
+        the same valley of the distance as the grid's, as on surfaces without waves finer than the
+        grid and not much flatter than wide.
 
         Parameters
         ----------
         points
-            Shape (..., 3).
+            Shape (..., 3), no coordinate beyond 1e100.
 
         Returns
         -------
@@ -215,6 +288,10 @@ class Surface:
         if targets.ndim < 1 or targets.shape[-1] != 3:
             raise GraspModuliError(f"points must have shape (..., 3), got {targets.shape}")
         flat = targets.reshape(-1, 3)
+        if (np.abs(flat) > FARTHEST).any():
+            raise GraspModuliError(
+                f"points must have coordinates up to {FARTHEST:g}, got {np.abs(flat).max():g}"
+            )
         grid_u, grid_theta = (
             a.ravel()
             for a in np.meshgrid(
@@ -303,10 +380,41 @@ class Surface:
 
     __rmul__ = __mul__
 
+    def __truediv__(self, divisor: float) -> Surface:
+        d = number("divisor", divisor, positive=True)
+        return Surface.from_coefficients(self.coefficients / d, self.bottom / d, self.top / d)
+
     def __add__(self, other: Surface) -> Surface:
         if not isinstance(other, Surface):
             return NotImplemented
         return Surface(_core.combine([1.0, 1.0], [self._core, other._core]))
+
+    def __radd__(self, other: Any) -> Surface:
+        # sum() starts with 0.
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
+    # Values -------------------------------------------------------------------------------
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Surface):
+            return NotImplemented
+        return (
+            self.bottom == other.bottom
+            and self.top == other.top
+            and np.array_equal(self._core.coefficients, other._core.coefficients)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.bottom, self.top, self._core.coefficients.tobytes()))
+
+    def __copy__(self) -> Surface:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Surface:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Surface.from_coefficients, (self._core.coefficients, self.bottom, self.top)
 
     def __repr__(self) -> str:
         rows, columns = self._core.coefficients.shape
@@ -316,8 +424,15 @@ class Surface:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes heights and coefficients as a NumPy ``.npz`` file."""
-        with replacing(Path(path)) as temporary, temporary.open("wb") as file:
-            np.savez(file, coefficients=self.coefficients, bottom=self.bottom, top=self.top)
+        try:
+            with replacing(Path(path)) as temporary, temporary.open("wb") as file:
+                np.savez(file, coefficients=self.coefficients, bottom=self.bottom, top=self.top)
+        except GraspModuliError:
+            raise
+        except (OSError, TypeError, ValueError) as error:
+            raise GraspModuliError(
+                f"path must be a file that can be written, got {path!r} ({error})"
+            ) from None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Surface:
@@ -335,21 +450,47 @@ class Surface:
 
 
 def combine(surfaces: Sequence[Surface], weights: ArrayLike) -> Surface:
-    """Σ weights_i · surfaces_i in the convex hull Conv(X) of Sec. III.
+    """Σ weights_i · surfaces_i, in the convex cone of Lemma III.1.
 
-    Weights are not negative and sum to 1 (to 1e-9). For the cone use ``2.0 * S + 0.5 * T``.
+    Weights are not negative and not all 0. Where they sum to 1 the result lies in the convex hull
+    Conv(X) of Sec. III, and is of the size of the surfaces; where they sum to s it is s times as
+    large as that. Exact to rounding, as sums of surfaces are.
+
+    Parameters
+    ----------
+    surfaces
+        n of them.
+    weights
+        One per surface. Shape (n,).
     """
+    given = some_surfaces("surfaces", surfaces)
     values = floats("weights", weights)
-    if values.shape != (len(surfaces),) or not len(surfaces):
+    if values.shape != (len(given),):
         raise GraspModuliError(
-            f"weights must be one per surface, got shape {values.shape} for {len(surfaces)}"
+            f"weights must be one per surface, got shape {values.shape} for {len(given)}"
         )
     if (values < 0.0).any():
         raise GraspModuliError(f"weights must not be negative, got {values.min()}")
-    if abs(values.sum() - 1.0) > 1e-9:
-        raise GraspModuliError(f"weights must sum to 1, got {values.sum()}")
-    terms = [(w, s) for w, s in zip(values.tolist(), surfaces, strict=True) if w > 0.0]
+    if not values.any():
+        raise GraspModuliError(f"weights must not all be 0, got {values.tolist()}")
+    terms = [(w, s) for w, s in zip(values.tolist(), given, strict=True) if w > 0.0]
     return Surface(_core.combine([w for w, _ in terms], [s._core for _, s in terms]))
+
+
+def a_surface(name: str, value: Any) -> Surface:
+    """``value`` if it is a surface."""
+    if not isinstance(value, Surface):
+        raise GraspModuliError(f"{name} must be a Surface, got {_what(value)}")
+    return value
+
+
+def some_surfaces(name: str, value: Any) -> list[Surface]:
+    """``value`` as a list, if it is a sequence of surfaces and not empty."""
+    if isinstance(value, Surface) or not isinstance(value, Sequence) or isinstance(value, str):
+        raise GraspModuliError(f"{name} must be a list of surfaces, got {_what(value)}")
+    if not value:
+        raise GraspModuliError(f"{name} must hold at least one surface, got none")
+    return [a_surface(f"{name}[{i}]", one) for i, one in enumerate(value)]
 
 
 def closest_combination(surface: Surface, surfaces: Sequence[Surface]) -> Floats:
@@ -360,8 +501,8 @@ def closest_combination(surface: Surface, surfaces: Sequence[Surface]) -> Floats
     """
     from scipy.optimize import nnls
 
-    if not len(surfaces):
-        raise GraspModuliError("surfaces must hold at least one surface, got none")
+    a_surface("surface", surface)
+    surfaces = some_surfaces("surfaces", surfaces)
     nodes, weights = np.polynomial.legendre.leggauss(48)
     u, theta = np.meshgrid(0.5 * (nodes + 1.0), 2 * np.pi * np.arange(96) / 96, indexing="ij")
     root = np.sqrt(np.repeat(0.5 * weights, 96) / 96)
@@ -384,7 +525,7 @@ def project(surface: Surface) -> Surface:
 
     The way there is ``interpolate((S, g), (project(S), g), t)``, or ``transfer`` to it.
     """
-    return Surface(surface._core.project())
+    return Surface(a_surface("surface", surface)._core.project())
 
 
 def _heights(bottom: float, top: float) -> tuple[float, float]:
@@ -406,11 +547,64 @@ def _greville(intervals: int) -> Floats:
     return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
 
 
-def _error(coefficients: Floats, values: Floats, u: Floats, theta: Floats) -> float:
-    """Largest difference of the spline from values on a tensor grid."""
+def _values(coefficients: Floats, u: Floats, theta: Floats) -> Floats:
+    """A spline at points."""
+    # It need not be positive to be compared: lift it above 0, which it passes on exactly, and make
+    # it of the size of 1, as a function may be of any.
+    scale = float(np.abs(coefficients).max())
+    lift = 1.0 - min(0.0, float(coefficients.min()) / scale)
+    core = _core.Surface(0.0, 1.0, coefficients / scale + lift)
+    radii = core.radius(np.ascontiguousarray(u.ravel()), np.ascontiguousarray(theta.ravel()))
+    return (radii[:, 0].reshape(u.shape) - lift) * scale
+
+
+def _error(
+    coefficients: Floats, sample: Callable[[Floats, Floats], Floats], u: Floats, theta: Floats
+) -> float:
+    """Largest difference of the spline from a function on a tensor grid."""
     us, thetas = np.meshgrid(u, theta, indexing="ij")
-    # A spline need not be positive to be compared: lift it above 0, which it passes on exactly.
-    lift = 1.0 - min(0.0, float(coefficients.min()))
-    core = _core.Surface(0.0, 1.0, coefficients + lift)
-    radii = core.radius(us.ravel(), thetas.ravel())[:, 0].reshape(us.shape)
-    return float(np.abs(radii - lift - values).max())
+    return float(np.abs(_values(coefficients, us, thetas) - sample(u, theta)).max())
+
+
+def _scattered(n: int) -> tuple[Floats, Floats]:
+    """(u, θ) of n points spread evenly over the rectangle, on no line of any grid: additive
+    recurrence with powers of the reciprocal of 1.3247…, the root of x³ = x + 1."""
+    k = np.arange(1.0, n + 1.0)
+    root = 1.324717957244746
+    return (k / root) % 1.0, 2 * np.pi * ((k / root**2) % 1.0)
+
+
+def _caller(radius: Any, arguments: int, of: str, else_: str) -> Callable[..., Any]:
+    """``radius``, if it can be called with so many arrays; what it raises then is a sentence."""
+    wanted = f"radius must be a function of arrays of {of} ({else_})"
+    if not callable(radius):
+        raise GraspModuliError(f"{wanted}, got {_what(radius)}")
+    try:
+        inspect.signature(radius).bind(*[None] * arguments)
+    except TypeError as error:
+        raise GraspModuliError(f"{wanted}, got one with {error}") from None
+    except ValueError:
+        # Functions in C need not have a signature.
+        pass
+
+    def call(*arrays: Floats) -> Any:
+        try:
+            return radius(*arrays)
+        except GraspModuliError:
+            raise
+        except (TypeError, ValueError) as error:
+            raise GraspModuliError(
+                f"{wanted}, got one that raises: {error} (np.vectorize makes functions of numbers "
+                "take arrays)"
+            ) from error
+
+    return call
+
+
+def _what(value: Any) -> str:
+    """What came instead of what was wanted, in a word or two."""
+    if value is None:
+        return "None"
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape} and type {value.dtype}"
+    return f"a {type(value).__name__}"

@@ -1,6 +1,6 @@
 //! Random grasps in the domain D(1) and near each other.
 
-use crate::{cone, table};
+use crate::{cone, raise, table};
 use graspmoduli::contact::Contact;
 use graspmoduli::domain::{self, Configuration, Stream};
 use numpy::{PyArray2, PyReadonlyArray2};
@@ -85,6 +85,7 @@ pub fn survey(
         let mut stream = Stream::new(seed, number);
         domain::survey(&mut stream, count, &cone, &thresholds, bins, width)
     });
+    let found = found.map_err(raise)?;
     Ok((
         found.unstable,
         found.outside,

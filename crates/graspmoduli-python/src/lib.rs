@@ -251,6 +251,11 @@ impl Surface {
         PyArray1::from_slice(py, self.0.coefficients()).reshape([rows, columns])
     }
 
+    #[getter]
+    fn is_revolution(&self) -> bool {
+        self.0.is_revolution()
+    }
+
     /// Per (u, θ): f, f_u, f_θ, f_uu, f_uθ, f_θθ.
     fn radius<'py>(
         &self,

@@ -5,6 +5,7 @@
 //! same bits on any machine.
 
 use crate::contact::{Contact, Frame, FrictionCone};
+use crate::error::Error;
 use crate::quality::Evaluator;
 use glam::DVec3;
 use rand_chacha::ChaCha8Rng;
@@ -117,7 +118,7 @@ pub struct Survey {
     pub largest: f64,
 }
 
-/// Q_l of the first `count` grasps of a stream.
+/// Q_l of the first `count` grasps of a stream, counted in at least one bin.
 pub fn survey(
     stream: &mut Stream,
     count: usize,
@@ -125,7 +126,10 @@ pub fn survey(
     thresholds: &[f64],
     bins: usize,
     width: f64,
-) -> Survey {
+) -> Result<Survey, Error> {
+    if bins == 0 {
+        return Err(Error::Bins(bins));
+    }
     let mut evaluator = Evaluator::new(cone);
     let mut found = Survey {
         unstable: 0,
@@ -148,7 +152,7 @@ pub fn survey(
         found.histogram[((quality / width) as usize).min(bins - 1)] += 1;
         found.largest = found.largest.max(quality);
     }
-    found
+    Ok(found)
 }
 
 /// Do two of the contacts squeeze or stretch along their line, within their friction cones? For

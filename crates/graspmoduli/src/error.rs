@@ -15,6 +15,8 @@ pub enum Error {
     CoefficientShape(usize, usize),
     /// The heights do not satisfy bottom < top.
     Heights(f64, f64),
+    /// A radius or height of a surface is too large or too small to compute with.
+    Length(f64),
     /// A spline coefficient is not positive and finite: row (height), column (angle), value.
     Coefficient(usize, usize, f64),
     /// The coefficients do not fill the stated shape: wanted, got.
@@ -35,7 +37,7 @@ pub enum Error {
         frictions: usize,
     },
     /// A slice is not as long as it must be.
-    Length {
+    Count {
         /// Of what.
         name: &'static str,
         /// How long it must be.
@@ -52,6 +54,10 @@ pub enum Error {
         /// and at most this.
         upper: f64,
     },
+    /// A relative error wanted that is not a positive number.
+    Tolerance(f64),
+    /// No bins to count in.
+    Bins(usize),
     /// The caller asked to stop.
     Interrupted,
 }
@@ -78,6 +84,11 @@ impl fmt::Display for Error {
                 out,
                 "bottom must be below top, both finite, got bottom {bottom} and top {top}"
             ),
+            Error::Length(got) => write!(
+                out,
+                "coefficients, heights and top - bottom must lie between 1e-50 and 1e50, got \
+                 {got:e}: choose another unit"
+            ),
             Error::Coefficient(row, column, value) => write!(
                 out,
                 "coefficients must be positive and finite so that the radius is positive, \
@@ -88,8 +99,8 @@ impl fmt::Display for Error {
             }
             Error::GridTooLarge(rows, columns) => write!(
                 out,
-                "surfaces must have spline grids with a small common refinement, \
-                 got one of {rows} by {columns}"
+                "surfaces must have spline grids with a common refinement of at most 8192 \
+                 intervals each way and 2 million in all, got one of {rows} by {columns}"
             ),
             Error::Weight(got) => {
                 write!(out, "weights must be positive finite numbers, got {got}")
@@ -105,7 +116,7 @@ impl fmt::Display for Error {
                  number for each centre of mass, got {points} contacts, {normals} normals and \
                  {frictions} friction coefficients for {centers} centres of mass"
             ),
-            Error::Length { name, wanted, got } => {
+            Error::Count { name, wanted, got } => {
                 write!(out, "{name} must hold {wanted} numbers, got {got}")
             }
             Error::NotConverged {
@@ -117,6 +128,8 @@ impl fmt::Display for Error {
                 "contacts must be a grasp whose quality can be computed, got one (number {grasp}) \
                  of which rounding leaves open where in [{lower}, {upper}] it lies"
             ),
+            Error::Tolerance(got) => write!(out, "tolerance must be a positive number, got {got}"),
+            Error::Bins(got) => write!(out, "bins must be at least 1, got {got}"),
             Error::Interrupted => write!(out, "interrupted"),
         }
     }

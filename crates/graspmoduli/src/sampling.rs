@@ -47,8 +47,9 @@ impl Cumulative {
     }
 }
 
-/// Maps points of the unit square to (u, θ) so that equal areas go to equal areas: u from the
-/// marginal distribution of the area density ‖t₁ × t₂‖, θ from the conditional one.
+/// Maps points of the unit square to (u, θ) so that equal areas go to equal areas, to the accuracy
+/// of Simpson's rule with two steps per spline interval: u from the marginal distribution of the
+/// area density ‖t₁ × t₂‖, θ from the conditional one.
 pub fn by_area(surface: &Surface, square: &[[f64; 2]]) -> Vec<[f64; 2]> {
     // At least the paper's 60 steps, and two per spline interval.
     let (rows, columns) = surface.shape();

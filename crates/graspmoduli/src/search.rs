@@ -58,7 +58,7 @@ pub fn best_subsets(
 ) -> Result<Vec<Ranked>, Error> {
     let n = contacts.len();
     if !frictions.is_empty() && frictions.len() != n {
-        return Err(Error::Length {
+        return Err(Error::Count {
             name: "frictions",
             wanted: n,
             got: frictions.len(),

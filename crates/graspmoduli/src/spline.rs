@@ -77,55 +77,57 @@ impl Basis {
         local
     }
 
-    /// Coefficients, on a grid `factor` times as fine, of the same spline: exact, by blossoming.
-    /// Coefficient j of a cubic spline is its polar form at the knots j+1, j+2, j+3.
+    /// Coefficients, on a grid `factor` times as fine, of the same spline, to rounding, by
+    /// blossoming: coefficient j of a cubic spline is its polar form at the knots j+1, j+2, j+3.
     pub fn refine(&self, factor: usize, coefficients: &[f64]) -> Vec<f64> {
-        let fine = self.intervals * factor;
+        let fine = (self.intervals * factor) as i64;
         let count = if self.periodic { fine } else { fine + 3 };
-        let scale = 1.0 / factor as f64;
+        let factor = factor as i64;
+        // Knots are whole numbers of fine intervals, so that they are exact on grids of any size.
+        let knot = |k: i64| self.knot(k - 3, fine);
         (0..count)
             .map(|j| {
-                let at = |k: usize| knot(k, fine, self.periodic) * scale;
-                // Any interval between the coefficient's knots will do; take a non-empty one.
-                let middle = (1..4)
-                    .map(|k| (at(j + k), at(j + k + 1)))
-                    .find(|(low, high)| low < high)
-                    .map_or(at(j), |(low, high)| 0.5 * (low + high));
-                let interval = middle.floor().clamp(0.0, (self.intervals - 1) as f64);
-                let interval = if self.periodic {
-                    middle.floor()
-                } else {
-                    interval
-                };
-                self.blossom(interval, [at(j + 1), at(j + 2), at(j + 3)], coefficients)
+                // Any interval between the coefficient's knots will do, if it is not empty.
+                let start = (j + 1..j + 4).find(|&k| knot(k) < knot(k + 1));
+                let interval = knot(start.unwrap_or(j)).div_euclid(factor);
+                let at = [j + 1, j + 2, j + 3]
+                    .map(|k| (knot(k) - interval * factor) as f64 / factor as f64);
+                self.blossom(interval, at, coefficients)
             })
             .collect()
     }
 
-    /// Polar form of the polynomial on one interval, by de Boor's algorithm.
-    fn blossom(&self, interval: f64, at: [f64; 3], coefficients: &[f64]) -> f64 {
+    /// Polar form of the polynomial on one interval, by de Boor's algorithm; arguments in units of
+    /// intervals from its left end.
+    fn blossom(&self, interval: i64, at: [f64; 3], coefficients: &[f64]) -> f64 {
         let n = coefficients.len() as i64;
-        let first = interval as i64;
         let mut d: [f64; 4] =
-            std::array::from_fn(|k| coefficients[(first + k as i64).rem_euclid(n) as usize]);
-        let knot = |k: i64| {
-            let value = k as f64;
-            if self.periodic {
-                value
-            } else {
-                value.clamp(0.0, self.intervals as f64)
-            }
+            std::array::from_fn(|k| coefficients[(interval + k as i64).rem_euclid(n) as usize]);
+        let (low, high) = d
+            .iter()
+            .fold((d[0], d[0]), |(low, high), &c| (c.min(low), c.max(high)));
+        let knot = |k: usize| {
+            (self.knot(interval + k as i64 - 3, self.intervals as i64) - interval) as f64
         };
         for (level, &x) in at.iter().enumerate() {
             for k in (level + 1..4).rev() {
-                // Knots in units of intervals: that of index i is i − 3.
-                let low = knot(first + k as i64 - 3);
-                let high = knot(first + k as i64 - level as i64);
-                let share = (x - low) / (high - low);
+                let (start, end) = (knot(k), knot(k + 3 - level));
+                let share = (x - start) / (end - start);
                 d[k] = (1.0 - share) * d[k - 1] + share * d[k];
             }
         }
-        d[3]
+        // At knots of a finer grid it is a mean of the four: rounding must not take it below 0.
+        d[3].clamp(low, high)
+    }
+
+    /// Knot `k` of a grid of so many intervals, in units of these: those beyond the ends of a
+    /// clamped grid lie in the ends.
+    fn knot(&self, k: i64, intervals: i64) -> i64 {
+        if self.periodic {
+            k
+        } else {
+            k.clamp(0, intervals)
+        }
     }
 }
 

@@ -8,11 +8,23 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// Largest number of spline intervals in a common refinement, per direction.
-const LARGEST_GRID: usize = 8192;
+/// Most spline intervals per direction, and most coefficients, of a common refinement: a surface
+/// of that many takes 16 MB.
+const MOST_INTERVALS: usize = 8192;
+const MOST_COEFFICIENTS: usize = 1 << 21;
+
+/// Lengths between these, in the unit of the object, are exact to rounding in all that is computed
+/// from them: products of six neither overflow nor vanish.
+const SHORTEST: f64 = 1e-50;
+const LONGEST: f64 = 1e50;
+
+/// How far a refined coefficient is from the exact one, relative to the largest coefficient: by
+/// nine rounded steps in each direction.
+const REFINED: f64 = 128.0 * f64::EPSILON;
 
 /// c(u, θ) = (f cos θ, f sin θ, (1 − u) a + u b) with f a tensor product of uniform cubic
 /// B-splines, clamped in u and periodic in θ. All coefficients are positive, hence f > 0.
+/// Lengths lie between 1e-50 and 1e50.
 #[derive(Debug, Clone)]
 pub struct Surface {
     bottom: f64,
@@ -60,6 +72,21 @@ pub struct Integrals {
     pub solid_center_of_mass: DVec3,
 }
 
+impl std::ops::Add for Radius {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        let sum = |k: usize| self.bend[k] + other.bend[k];
+        Self {
+            value: self.value + other.value,
+            slope: [
+                self.slope[0] + other.slope[0],
+                self.slope[1] + other.slope[1],
+            ],
+            bend: [sum(0), sum(1), sum(2)],
+        }
+    }
+}
+
 impl Surface {
     /// From spline coefficients, row-major with `columns` per row.
     pub fn new(
@@ -70,6 +97,10 @@ impl Surface {
     ) -> Result<Self, Error> {
         if !(bottom.is_finite() && top.is_finite() && bottom < top) {
             return Err(Error::Heights(bottom, top));
+        }
+        let farthest = bottom.abs().max(top.abs());
+        if let Some(&length) = [top - bottom, farthest].iter().find(|l| out_of_range(l)) {
+            return Err(Error::Length(length));
         }
         let rows = coefficients.len() / columns.max(1);
         if rows < 4 || columns < 4 {
@@ -82,6 +113,9 @@ impl Surface {
         if let Some(index) = coefficients.iter().position(wrong) {
             let value = coefficients[index];
             return Err(Error::Coefficient(index / columns, index % columns, value));
+        }
+        if let Some(&length) = coefficients.iter().find(|c| out_of_range(c)) {
+            return Err(Error::Length(length));
         }
         Ok(Self {
             bottom,
@@ -114,9 +148,10 @@ impl Surface {
         (self.coefficients.len() / self.columns, self.columns)
     }
 
-    /// f and its derivatives at (u, θ); u in [0, 1], θ any real.
+    /// f and its derivatives at (u, θ); u in [0, 1], θ any real, reduced modulo 2π.
     #[inline]
     pub fn radius(&self, u: f64, theta: f64) -> Radius {
+        let theta = reduced(theta);
         self.contract(&self.u_basis.at(u), &self.theta_basis.at(theta / TAU))
     }
 
@@ -163,6 +198,7 @@ impl Surface {
     /// In the frame e_r, e_θ, e_z that turns with θ, and with H = b − a,
     /// t₁ × t₂ = (−H f, H f_θ, f f_u): it points inward.
     pub fn place(&self, u: f64, theta: f64) -> Placed {
+        let theta = reduced(theta);
         let Radius {
             value: f,
             slope: [fu, ft],
@@ -189,6 +225,7 @@ impl Surface {
 
     /// ∂²c/∂u², ∂²c/∂u∂θ, ∂²c/∂θ².
     pub fn second_derivatives(&self, u: f64, theta: f64) -> [DVec3; 3] {
+        let theta = reduced(theta);
         let Radius {
             value: f,
             slope: [fu, ft],
@@ -242,9 +279,10 @@ impl Surface {
         })
     }
 
-    /// The same by Simpson's rule with an even number of steps in each direction, as in the paper
-    /// (60 in IV.B, 20 in IV.E).
+    /// The same by Simpson's rule, as in the paper (60 steps in each direction in IV.B, 20 in IV.E).
+    /// The rule wants an even number, so an odd one counts as the next.
     pub fn integrals_by_simpson(&self, steps: usize) -> Integrals {
+        let steps = steps.max(2).next_multiple_of(2);
         let rule = |length: f64| -> Vec<(f64, f64)> {
             simpson(steps)
                 .enumerate()
@@ -293,8 +331,9 @@ impl Surface {
         }
     }
 
-    /// Σ weight·S in the convex cone of surfaces (Lemma III.1): exact on the coefficients, once
-    /// all are written on a common refinement of their grids. Weights are positive.
+    /// Σ weight·S in the convex cone of surfaces (Lemma III.1): exact to rounding, on the
+    /// coefficients, once all are written on a common refinement of their grids; an error where that
+    /// is too large. Weights are positive.
     pub fn combine(terms: &[(f64, &Surface)]) -> Result<Self, Error> {
         let (intervals, columns) = common_grid(terms.iter().map(|&(_, surface)| surface))?;
         let mut sum = vec![0.0; (intervals + 3) * columns];
@@ -352,12 +391,58 @@ impl Surface {
         net
     }
 
-    /// The same surface on the smallest periodic grid, if to rounding it is one of revolution.
-    pub(crate) fn of_revolution(&self) -> Option<Self> {
-        let largest = self.coefficients.iter().fold(0.0, |m: f64, &c| m.max(c));
-        let even = |row: &[f64]| row.iter().all(|c| (c - row[0]).abs() <= 1e-14 * largest);
-        let mut rows = self.coefficients.chunks_exact(self.columns);
-        rows.all(even).then(|| self.project())
+    /// The smallest and the largest of the coefficients that the radius on a patch is a mean of.
+    pub(crate) fn patch_range(&self, interval: usize, column: usize) -> (f64, f64) {
+        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        for row in self.coefficients[interval * self.columns..][..4 * self.columns]
+            .chunks_exact(self.columns)
+        {
+            for k in 0..4 {
+                let c = row[(column + k) % self.columns];
+                range = (range.0.min(c), range.1.max(c));
+            }
+        }
+        range
+    }
+
+    /// Is it a surface of revolution, to rounding?
+    pub fn is_revolution(&self) -> bool {
+        self.as_revolution().is_some()
+    }
+
+    /// The surface on the smallest periodic grid, if to rounding it is one of revolution, and by how
+    /// much its coefficients differ from that.
+    pub(crate) fn as_revolution(&self) -> Option<(Self, f64)> {
+        let projected = self.project();
+        let means = projected.coefficients.chunks_exact(projected.columns);
+        let rows = self.coefficients.chunks_exact(self.columns);
+        let deviation = rows
+            .zip(means)
+            .flat_map(|(row, mean)| row.iter().map(|c| (c - mean[0]).abs()))
+            .fold(0.0, f64::max);
+        (deviation <= 1e-14 * self.largest_coefficient()).then_some((projected, deviation))
+    }
+
+    pub(crate) fn largest_coefficient(&self) -> f64 {
+        self.coefficients.iter().fold(0.0, |m: f64, &c| m.max(c))
+    }
+
+    /// By how much the coefficients of `self.on_common_grid(other)` may be off.
+    pub(crate) fn refinement_error(&self, refined: &Self) -> f64 {
+        if self.shape() == refined.shape() {
+            0.0
+        } else {
+            REFINED * self.largest_coefficient()
+        }
+    }
+
+    /// A function on the same grid with other coefficients, of any sign: no surface.
+    pub(crate) fn with_coefficients(&self, coefficients: Vec<f64>) -> Self {
+        Self {
+            coefficients,
+            integrals: OnceLock::new(),
+            ..self.clone()
+        }
     }
 
     /// Coefficients on a grid of so many intervals in u and θ, multiples of the present ones.
@@ -428,10 +513,11 @@ impl Surface {
         deviation < 0.015 * means.iter().sum::<f64>() * self.columns as f64
     }
 
+    /// The mean of each row; where all of it is the same number, that.
     fn row_means(&self) -> Vec<f64> {
         self.coefficients
             .chunks_exact(self.columns)
-            .map(|row| row.iter().sum::<f64>() / self.columns as f64)
+            .map(|row| row[0] + row.iter().map(|c| c - row[0]).sum::<f64>() / row.len() as f64)
             .collect()
     }
 
@@ -446,6 +532,20 @@ impl Surface {
         }
         farthest
     }
+}
+
+/// θ modulo 2π as far as that is a number, so that radius, sine and cosine are those of one angle
+/// and points lie on the surface, whatever θ.
+fn reduced(theta: f64) -> f64 {
+    if theta.abs() <= TAU {
+        theta
+    } else {
+        theta % TAU
+    }
+}
+
+fn out_of_range(length: &f64) -> bool {
+    !(SHORTEST..=LONGEST).contains(length)
 }
 
 /// Simpson's weights for `steps` steps of unit length.
@@ -467,7 +567,8 @@ fn common_grid<'a>(
         intervals = least_common_multiple(intervals, surface.u_basis.intervals());
         columns = least_common_multiple(columns, surface.columns);
     }
-    if intervals > LARGEST_GRID || columns > LARGEST_GRID {
+    let coefficients = (intervals.saturating_add(3)).saturating_mul(columns);
+    if intervals > MOST_INTERVALS || columns > MOST_INTERVALS || coefficients > MOST_COEFFICIENTS {
         return Err(Error::GridTooLarge(intervals, columns));
     }
     Ok((intervals, columns))

@@ -126,7 +126,7 @@ fn friction_for_other_contacts_is_refused_and_a_stop_is_heard() {
     let few = best_subsets(&contacts, &[1.0; 3], DVec3::ZERO, &cone, 3, 1, 1, go);
     assert!(matches!(
         few,
-        Err(Error::Length {
+        Err(Error::Count {
             wanted: 10,
             got: 3,
             ..

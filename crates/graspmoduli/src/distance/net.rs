@@ -51,13 +51,21 @@ impl Range {
     }
 
     /// The largest |x|.
-    pub fn most(self) -> f64 {
+    pub fn largest(self) -> f64 {
         self.high.max(-self.low)
     }
 
     /// The smallest |x|.
-    pub fn least(self) -> f64 {
+    pub fn smallest(self) -> f64 {
         self.low.max(-self.high).max(0.0)
+    }
+
+    /// With numbers that were computed to an error.
+    fn widened(self, error: f64) -> Self {
+        Self {
+            low: self.low - error,
+            high: self.high + error,
+        }
     }
 }
 
@@ -75,22 +83,26 @@ impl Mul<f64> for Range {
 /// Of ∂^{a+b}f/∂u^a∂θ^b, a + b ≤ 3, by [a][b]. The others are empty.
 pub type Ranges = [[Range; 4]; 4];
 
-/// On a cell of half the width `span`.
-pub fn ranges_on(net: &Net, span: DVec2) -> Ranges {
+/// What a difference quotient of numbers with an error e is off, in units of e times the factor: 2,
+/// and something for its own rounding, as e is at least a hundred units of rounding of the numbers.
+const QUOTIENT: f64 = 2.5;
+
+/// On a cell of half the width `span`, the points of the net known to `error`.
+pub fn ranges_on(net: &Net, span: DVec2, error: f64) -> Ranges {
     let mut out = [[Range::EMPTY; 4]; 4];
-    derivatives::<4>(net, span, &mut out[0]);
-    let along_u = derivative_along_u::<4>(net, span);
-    derivatives::<3>(&along_u, span, &mut out[1]);
-    let along_u = derivative_along_u::<3>(&along_u, span);
-    derivatives::<2>(&along_u, span, &mut out[2]);
-    let along_u = derivative_along_u::<2>(&along_u, span);
-    derivatives::<1>(&along_u, span, &mut out[3]);
+    derivatives::<4>(net, span, error, &mut out[0]);
+    let (along_u, error) = derivative_along_u::<4>(net, span, error);
+    derivatives::<3>(&along_u, span, error, &mut out[1]);
+    let (along_u, error) = derivative_along_u::<3>(&along_u, span, error);
+    derivatives::<2>(&along_u, span, error, &mut out[2]);
+    let (along_u, error) = derivative_along_u::<2>(&along_u, span, error);
+    derivatives::<1>(&along_u, span, error, &mut out[3]);
     out
 }
 
 /// From `ROWS` rows to one less.
 #[inline(always)]
-fn derivative_along_u<const ROWS: usize>(net: &Net, span: DVec2) -> Net {
+fn derivative_along_u<const ROWS: usize>(net: &Net, span: DVec2, error: f64) -> (Net, f64) {
     let factor = (ROWS - 1) as f64 / (2.0 * span.x);
     let mut out = *net;
     for i in 0..ROWS - 1 {
@@ -98,12 +110,12 @@ fn derivative_along_u<const ROWS: usize>(net: &Net, span: DVec2) -> Net {
             out[i][j] = factor * (net[i + 1][j] - net[i][j]);
         }
     }
-    out
+    (out, QUOTIENT * factor * error)
 }
 
 /// Ranges of `ROWS` rows and their first `ROWS` − 1 derivatives along θ.
 #[inline(always)]
-fn derivatives<const ROWS: usize>(net: &Net, span: DVec2, out: &mut [Range; 4]) {
+fn derivatives<const ROWS: usize>(net: &Net, span: DVec2, mut error: f64, out: &mut [Range; 4]) {
     let mut d = *net;
     for (b, out) in out[..ROWS].iter_mut().enumerate() {
         if b > 0 {
@@ -113,10 +125,12 @@ fn derivatives<const ROWS: usize>(net: &Net, span: DVec2, out: &mut [Range; 4]) 
                     row[j] = factor * (row[j + 1] - row[j]);
                 }
             }
+            error *= QUOTIENT * factor;
         }
         for row in &d[..ROWS] {
             *out = row[..4 - b].iter().fold(*out, |range, &x| range.with(x));
         }
+        *out = out.widened(error);
     }
 }
 
@@ -144,7 +158,12 @@ pub fn ranges_on_patches(coefficients: &[f64], columns: usize) -> Vec<[Range; 3]
     values
         .into_iter()
         .zip(slopes.into_iter().zip(turns))
-        .map(|(value, (slope, turn))| [value, slope, turn])
+        .map(|(value, (slope, turn))| {
+            // Differences of rounded numbers, times 3 per interval at most.
+            let error = 16.0 * f64::EPSILON * value.largest();
+            let slope = slope.widened(3.0 * intervals as f64 * error);
+            [value, slope, turn.widened(columns as f64 * error)]
+        })
         .collect()
 }
 
@@ -185,7 +204,7 @@ mod tests {
         assert_eq!(wide.len(), (rows - 3) * columns);
         for (patch, wide) in wide.iter().enumerate() {
             let (i, j) = (patch / columns, patch % columns);
-            let close = ranges_on(&surface.bezier_net(i, j), span);
+            let close = ranges_on(&surface.bezier_net(i, j), span, 1e-13);
             let close_low = [close[0][0], close[1][0], close[0][1]];
             for k in 0..64 {
                 let (s, t) = ((k / 8) as f64 / 7.0, (k % 8) as f64 / 7.0);

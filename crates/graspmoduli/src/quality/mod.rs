@@ -604,7 +604,7 @@ impl Batch<'_> {
     ) -> Result<(), Error> {
         let m = self.contacts_per_grasp()?;
         if out.len() != self.centers.len() * width {
-            return Err(Error::Length {
+            return Err(Error::Count {
                 name: "out",
                 wanted: self.centers.len() * width,
                 got: out.len(),
