@@ -14,7 +14,7 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`
-errors                 :class:`GraspModuliError`
+errors                 :class:`GraspModuliError`, :class:`MissingExtraError`
 =====================  ======================================================================
 
 The mathematics is that of F. T. Pokorny, K. Hang, D. Kragic, *Grasp Moduli Spaces*, RSS 2013.
@@ -24,6 +24,7 @@ object, normals point into it.
 
 from . import shapes as shapes
 from ._core import GraspModuliError as GraspModuliError
+from ._extras import MissingExtraError as MissingExtraError
 from .fitting import Fit as Fit
 from .fitting import ObjectGrasp as ObjectGrasp
 from .fitting import Residual as Residual

@@ -9,13 +9,13 @@ import numpy as np
 
 import graspmoduli as gm
 
+from ._extras import missing
+
 try:
     import jax
     import jax.numpy as jnp
 except ImportError as error:
-    raise ImportError(
-        "graspmoduli.jax needs JAX: install it with pip install 'graspmoduli[jax]'"
-    ) from error
+    raise missing("graspmoduli.jax", "JAX", "jax") from error
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(3,))

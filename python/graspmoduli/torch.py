@@ -6,13 +6,13 @@ from typing import Any
 
 import graspmoduli as gm
 
+from ._extras import missing
+
 try:
     import torch
     from torch.autograd.function import once_differentiable
 except ImportError as error:
-    raise ImportError(
-        "graspmoduli.torch needs PyTorch: install it with pip install 'graspmoduli[torch]'"
-    ) from error
+    raise missing("graspmoduli.torch", "PyTorch", "torch") from error
 
 
 class _Quality(torch.autograd.Function):
