@@ -10,58 +10,30 @@ Floats = NDArray[np.float64]
 class GraspModuliError(ValueError):
     """Wrong input: names the argument, what was wanted and what came."""
 
+#: Contacts and normals (n, m, 3), centres of mass (n, 3), frictions (n, m) where contacts differ.
+Grasps = tuple[Floats, Floats, Floats, Floats | None]
+#: Friction, edges, torsion.
+Cone = tuple[float, int, float]
+
 def is_clean(points: Floats, normals: Floats, centers: Floats) -> bool: ...
-def quality(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: Floats,
-    friction: float,
-    edges: int,
-    torsion: float,
-    each: bool,
-) -> Floats: ...
-def quality_gradient(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: Floats,
-    friction: float,
-    edges: int,
-    torsion: float,
-) -> Floats: ...
-def quality_at_least(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: Floats,
-    threshold: float,
-    friction: float,
-    edges: int,
-    torsion: float,
-) -> NDArray[np.bool_]: ...
-def extreme_quality(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: Floats,
-    friction: float,
-    edges: int,
-    torsion: float,
-    largest: bool,
-) -> tuple[int, float] | None: ...
-def circular_quality(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: Floats,
-    friction: float,
-    tolerance: float,
-) -> Floats: ...
-def weakest(
-    contacts: Floats,
-    normals: Floats,
-    center_of_mass: tuple[float, float, float],
-    friction: float,
-    edges: int,
-    torsion: float,
-    each: bool,
-) -> tuple[float, list[float]]: ...
+def quality_of_one(
+    contacts: object,
+    normals: object,
+    center_of_mass: object,
+    friction: object,
+    edges: object,
+    torsion: object,
+    norm: object,
+    length_scale: object,
+) -> float | None: ...
+def quality(grasps: Grasps, cone: Cone, each: bool) -> Floats: ...
+def quality_gradient(grasps: Grasps, cone: Cone) -> Floats: ...
+def quality_at_least(grasps: Grasps, cone: Cone, threshold: float) -> NDArray[np.bool_]: ...
+def extreme_quality(grasps: Grasps, cone: Cone, largest: bool) -> tuple[int, float] | None: ...
+def circular_quality(grasps: Grasps, cone: Cone, tolerance: float) -> Floats: ...
+def weakest(grasps: Grasps, cone: Cone, each: bool) -> tuple[float, list[float]]: ...
+def tangents(normals: Floats) -> Floats: ...
+def contact_forces(normals: Floats, friction: Floats, edges: int) -> Floats: ...
 
 class Surface:
     def __new__(cls, bottom: float, top: float, coefficients: Floats) -> Surface: ...

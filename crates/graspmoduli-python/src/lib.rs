@@ -2,19 +2,18 @@
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
 mod domain;
+mod quality;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
-use graspmoduli::contact::{Contact, FrictionCone};
+use graspmoduli::contact::FrictionCone;
 use graspmoduli::distance;
 use graspmoduli::error::Error;
-use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use graspmoduli::search;
 use graspmoduli::synthesis;
 use graspmoduli::transfer::{Carried, Deformation, Schedule};
 use graspmoduli::{sampling, surface};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyReadonlyArrayDyn,
 };
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -35,33 +34,21 @@ fn vectors(values: &[f64]) -> &[[f64; 3]] {
     values.as_chunks().0
 }
 
-fn batch<'a>(
-    contacts: &'a PyReadonlyArray3<'_, f64>,
-    normals: &'a PyReadonlyArray3<'_, f64>,
-    center_of_mass: &'a PyReadonlyArray2<'_, f64>,
-) -> PyResult<Batch<'a>> {
-    Ok(Batch {
-        points: vectors(contacts.as_slice()?),
-        normals: vectors(normals.as_slice()?),
-        centers: vectors(center_of_mass.as_slice()?),
-    })
+/// The friction cones of a call, from a tuple: friction, edges, torsion.
+#[derive(FromPyObject, Clone, Copy, PartialEq)]
+pub struct Cone {
+    #[pyo3(item(0))]
+    friction: f64,
+    #[pyo3(item(1))]
+    edges: usize,
+    #[pyo3(item(2))]
+    torsion: f64,
 }
 
-/// Are all numbers finite and all normals unit to rounding?
-#[pyfunction]
-fn is_clean(
-    points: PyReadonlyArrayDyn<'_, f64>,
-    normals: PyReadonlyArrayDyn<'_, f64>,
-    centers: PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<bool> {
-    // Without branches this is as fast as memory.
-    let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-    let unit = vectors(normals.as_slice()?)
-        .iter()
-        .fold(true, |all, [x, y, z]| {
-            all & ((x * x + y * y + z * z - 1.0).abs() < 2e-15)
-        });
-    Ok(unit && finite(points.as_slice()?) && finite(centers.as_slice()?))
+impl Cone {
+    fn build(&self) -> PyResult<FrictionCone> {
+        cone(self.friction, self.edges, self.torsion)
+    }
 }
 
 /// The friction cone of hard or soft fingers.
@@ -69,142 +56,6 @@ fn cone(friction: f64, edges: usize, torsion: f64) -> PyResult<FrictionCone> {
     FrictionCone::new(friction, edges)
         .and_then(|cone| cone.soft(torsion))
         .map_err(raise)
-}
-
-fn norm(each: bool) -> Norm {
-    if each { Norm::Each } else { Norm::Sum }
-}
-
-/// Exact Q_l of n grasps, or Q'_l if `each`.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn quality<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    each: bool,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, norm(each), &mut out));
-    Ok(PyArray1::from_vec(py, out))
-}
-
-/// Exact Q_l of n grasps and its gradient: per row value, contacts, normals, centre of mass.
-#[pyfunction]
-fn quality_gradient<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let width = Gradient::width(contacts.as_array().shape()[1]);
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![0.0; batch.centers.len() * width];
-    py.detach(|| batch.gradient(&cone, &mut out));
-    PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
-}
-
-/// Whether Q_l ≥ threshold, of n grasps.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn quality_at_least<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    threshold: f64,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![false; batch.centers.len()];
-    py.detach(|| batch.is_at_least(&cone, threshold, &mut out));
-    Ok(PyArray1::from_vec(py, out))
-}
-
-/// Index and Q_l of the best of n grasps, or of the worst.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn extreme_quality(
-    py: Python<'_>,
-    contacts: PyReadonlyArray3<'_, f64>,
-    normals: PyReadonlyArray3<'_, f64>,
-    center_of_mass: PyReadonlyArray2<'_, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    largest: bool,
-) -> PyResult<Option<(usize, f64)>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    Ok(py.detach(|| {
-        if largest {
-            batch.largest(&cone)
-        } else {
-            batch.smallest(&cone)
-        }
-    }))
-}
-
-/// Bounds of the quality with circular cones of n grasps.
-#[pyfunction]
-fn circular_quality<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    tolerance: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = cone(friction, 3, 0.0)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![[0.0; 2]; batch.centers.len()];
-    py.detach(|| batch.circular(&cone, tolerance, &mut out));
-    table(py, out)
-}
-
-/// Q_l or Q'_l of one grasp by the expanding polytope, and the normal of the nearest facet.
-#[pyfunction]
-fn weakest(
-    contacts: PyReadonlyArray2<'_, f64>,
-    normals: PyReadonlyArray2<'_, f64>,
-    center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    each: bool,
-) -> PyResult<(f64, [f64; 6])> {
-    let cone = cone(friction, edges, torsion)?;
-    let contacts = single(&contacts, &normals)?;
-    let weakest = Evaluator::new(&cone).weakest(&contacts, center_of_mass.into(), norm(each));
-    Ok((weakest.quality, weakest.direction))
-}
-
-/// The contacts of one grasp.
-fn single(
-    contacts: &PyReadonlyArray2<'_, f64>,
-    normals: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<Vec<Contact>> {
-    Ok(vectors(contacts.as_slice()?)
-        .iter()
-        .zip(vectors(normals.as_slice()?))
-        .map(|(&point, &normal)| Contact {
-            point: point.into(),
-            normal: normal.into(),
-        })
-        .collect())
 }
 
 /// Rows of equal length as an array.
@@ -350,7 +201,7 @@ fn best_subsets<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(Vec<usize>, f64)>> {
     let cone = FrictionCone::new(friction, edges).map_err(raise)?;
-    let contacts = single(&contacts, &normals)?;
+    let contacts = quality::contacts(vectors(contacts.as_slice()?), vectors(normals.as_slice()?));
     let mut failure = None;
     let result = py.detach(|| {
         let report = |done, total| {
@@ -540,9 +391,13 @@ mod _core {
     #[pymodule_export]
     use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
     #[pymodule_export]
+    use super::quality::{
+        circular_quality, contact_forces, extreme_quality, is_clean, quality, quality_at_least,
+        quality_gradient, quality_of_one, tangents, weakest,
+    };
+    #[pymodule_export]
     use super::{
-        GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,
-        extreme_quality, is_clean, quality, quality_at_least, quality_gradient, sample_points,
-        surface_distance, synthesize, weakest,
+        GraspModuliError, PyDeformation, Surface, best_subsets, combine, sample_points,
+        surface_distance, synthesize,
     };
 }
