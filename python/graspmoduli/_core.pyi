@@ -12,8 +12,8 @@ class GraspModuliError(ValueError):
 
 #: Contacts and normals (n, m, 3), centres of mass (n, 3), frictions (n, m) where contacts differ.
 Grasps = tuple[Floats, Floats, Floats, Floats | None]
-#: Friction, edges, torsion.
-Cone = tuple[float, int, float]
+#: Friction coefficients, one for all contacts or one each; edges; torsion.
+Cone = tuple[list[float], int, float]
 
 def is_clean(points: Floats, normals: Floats, centers: Floats) -> bool: ...
 def quality_of_one(
@@ -56,9 +56,9 @@ def sample_points(surface: Surface, square: Floats) -> Floats: ...
 def best_subsets(
     contacts: Floats,
     normals: Floats,
+    frictions: Floats | None,
     center_of_mass: tuple[float, float, float],
-    friction: float,
-    edges: int,
+    cone: Cone,
     size: int,
     top: int,
     threads: int,
@@ -67,8 +67,7 @@ def best_subsets(
 def synthesize(
     surface: Surface,
     center_of_mass: tuple[float, float, float],
-    friction: float,
-    edges: int,
+    cone: Cone,
     top: int,
     starts: int,
     square: Floats,
@@ -82,25 +81,18 @@ Transferred = tuple[Floats, Floats, int]
 
 class Deformation:
     def __new__(cls, source: Surface, target: Surface) -> Deformation: ...
-    def naive(
-        self, grasps: Floats, friction: float, edges: int, samples: int
-    ) -> list[Transferred]: ...
+    def naive(self, grasps: Floats, cone: Cone, samples: int) -> list[Transferred]: ...
     def by_gradient(
         self,
         grasps: Floats,
-        friction: float,
-        edges: int,
+        cone: Cone,
         surfaces: int,
         steps: int,
         length: float,
         difference: float | None,
     ) -> list[Transferred]: ...
     def by_ascent(
-        self,
-        grasps: Floats,
-        friction: float,
-        edges: int,
-        allowed: NDArray[np.bool_] | None,
+        self, grasps: Floats, cone: Cone, allowed: NDArray[np.bool_] | None
     ) -> list[Transferred]: ...
 
 def random_grasps(seed: int, number: int, count: int) -> Floats: ...

@@ -34,20 +34,16 @@ fn vectors(values: &[f64]) -> &[[f64; 3]] {
     values.as_chunks().0
 }
 
-/// The friction cones of a call, from a tuple: friction, edges, torsion.
-#[derive(FromPyObject, Clone, Copy, PartialEq)]
-pub struct Cone {
-    #[pyo3(item(0))]
-    friction: f64,
-    #[pyo3(item(1))]
-    edges: usize,
-    #[pyo3(item(2))]
-    torsion: f64,
-}
+/// The friction cones of a call, from a tuple: coefficients, one for all contacts or one each;
+/// edges; torsion.
+#[derive(FromPyObject)]
+pub struct Cone(Vec<f64>, usize, f64);
 
 impl Cone {
     fn build(&self) -> PyResult<FrictionCone> {
-        cone(self.friction, self.edges, self.torsion)
+        FrictionCone::each(&self.0, self.1)
+            .and_then(|cone| cone.soft(self.2))
+            .map_err(raise)
     }
 }
 
@@ -192,15 +188,19 @@ fn best_subsets<'py>(
     py: Python<'py>,
     contacts: PyReadonlyArray2<'py, f64>,
     normals: PyReadonlyArray2<'py, f64>,
+    frictions: Option<PyReadonlyArray1<'py, f64>>,
     center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
+    cone: Cone,
     size: usize,
     top: usize,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(Vec<usize>, f64)>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let cone = cone.build()?;
+    let frictions = match &frictions {
+        Some(each) => each.as_slice()?,
+        None => &[],
+    };
     let contacts = quality::contacts(vectors(contacts.as_slice()?), vectors(normals.as_slice()?));
     let mut failure = None;
     let result = py.detach(|| {
@@ -220,7 +220,9 @@ fn best_subsets<'py>(
             }
         };
         let center = center_of_mass.into();
-        search::best_subsets(&contacts, center, &cone, size, top, threads, report)
+        search::best_subsets(
+            &contacts, frictions, center, &cone, size, top, threads, report,
+        )
     });
     match (result, failure) {
         (Ok(ranked), _) => Ok(ranked.into_iter().map(|r| (r.indices, r.quality)).collect()),
@@ -237,14 +239,13 @@ fn synthesize<'py>(
     py: Python<'py>,
     surface: &Surface,
     center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
+    cone: Cone,
     top: usize,
     starts: usize,
     square: PyReadonlyArray2<'py, f64>,
     allowed: Option<PyReadonlyArray2<'py, bool>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let cone = cone.build()?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
     let found = py.detach(|| {
@@ -315,11 +316,10 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         samples: usize,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
         let carried = py.detach(|| self.0.naive(&grasps, &cone, samples));
         transferred(py, carried)
@@ -331,14 +331,13 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         surfaces: usize,
         steps: usize,
         length: f64,
         difference: Option<f64>,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
         let schedule = Schedule {
             surfaces,
@@ -356,11 +355,10 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         allowed: Option<PyReadonlyArray2<'py, bool>>,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps: Vec<_> = coordinates(&grasps)?
             .iter()
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])

@@ -1,6 +1,6 @@
 //! Grasp quality: `graspmoduli/quality.py` and `wrench_space.py`.
 
-use crate::{Cone, table, vectors};
+use crate::{Cone, raise, table, vectors};
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use numpy::{
@@ -27,6 +27,10 @@ impl Grasps<'_> {
             points: vectors(self.0.as_slice()?),
             normals: vectors(self.1.as_slice()?),
             centers: vectors(self.2.as_slice()?),
+            frictions: match &self.3 {
+                Some(each) => each.as_slice()?,
+                None => &[],
+            },
         })
     }
 }
@@ -73,7 +77,7 @@ pub fn is_clean(
 
 thread_local! {
     /// The evaluator of the last single grasp, for the next one with the same cones.
-    static LAST: RefCell<Option<(Cone, Evaluator)>> = const { RefCell::new(None) };
+    static LAST: RefCell<Option<([f64; 3], Evaluator)>> = const { RefCell::new(None) };
 }
 
 /// Q of one grasp, if everything is as the kernel wants it, down to the types; otherwise `None`,
@@ -96,15 +100,13 @@ pub fn quality_of_one(
         let normals = triples(normals)?;
         let center = triple(center_of_mass)?;
         let scale = plain(length_scale, 1.0)?;
-        let cone = Cone {
-            friction: plain(friction, 1.0)?,
-            edges: whole(edges, 8)?,
-            torsion: plain(torsion, 0.0)? / scale,
-        };
+        let (friction, edges) = (plain(friction, 1.0)?, whole(edges, 8)?);
+        let torsion = plain(torsion, 0.0)? / scale;
         let each = norm.cast::<PyString>().ok()?.to_str().ok()? != "sum";
-        let fine = (3..=1 << 16).contains(&cone.edges)
-            && (0.0..=1e6).contains(&cone.friction)
-            && (cone.torsion == 0.0 || cone.torsion > 0.0 && is_usable(cone.torsion))
+        let fine = (3..=1 << 16).contains(&edges)
+            && (0.0..=1e6).contains(&friction)
+            && torsion >= 0.0
+            && is_usable(torsion)
             && (!each || norm.eq("each").ok()?)
             && scale > 0.0
             && points.len() == normals.len()
@@ -122,28 +124,38 @@ pub fn quality_of_one(
                     normal: normal.into(),
                 })
                 .collect();
-            (contacts, by(center), cone, each)
+            (
+                contacts,
+                by(center),
+                [friction, edges as f64, torsion],
+                each,
+            )
         })
     };
     let Some((contacts, center, cone, each)) = given() else {
         return Ok(None);
     };
-    let run = || -> PyResult<f64> {
+    let [friction, edges, torsion] = cone;
+    let run = || -> PyResult<Option<f64>> {
         LAST.with_borrow_mut(|last| {
-            if last.as_ref().is_none_or(|(known, _)| *known != cone) {
-                *last = Some((cone, Evaluator::new(&cone.build()?)));
-            }
-            let (_, evaluator) = last.as_mut().expect("it was just made");
-            Ok(if each {
+            let mut evaluator = match last.take() {
+                Some((known, evaluator)) if known == cone => evaluator,
+                _ => Evaluator::new(&Cone(vec![friction], edges as usize, torsion).build()?),
+            };
+            let value = if each {
                 evaluator.quality_of_each(&contacts, center.into())
             } else {
                 evaluator.quality(&contacts, center.into())
-            })
+            };
+            // An error with its sentence is the careful way's, too.
+            let known = evaluator.take_unconverged().is_none();
+            *last = Some((cone, evaluator));
+            Ok(known.then_some(value))
         })
     };
     // The closed form of few edges is over before the interpreter would be given away.
-    let short = contacts.len() == 3 && cone.torsion == 0.0 && cone.edges <= 16 && !each;
-    Ok(Some(if short { run()? } else { py.detach(run)? }))
+    let short = contacts.len() == 3 && torsion == 0.0 && edges <= 16.0 && !each;
+    if short { run() } else { py.detach(run) }
 }
 
 /// A contiguous float64 array of shape (m, 3).
@@ -201,7 +213,8 @@ pub fn quality<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![0.0; batch.centers.len()];
-    py.detach(|| batch.quality(&cone, norm(each), &mut out));
+    py.detach(|| batch.quality(&cone, norm(each), &mut out))
+        .map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -215,7 +228,8 @@ pub fn quality_gradient<'py>(
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let width = Gradient::width(grasps.0.as_array().shape()[1]);
     let mut out = vec![0.0; batch.centers.len() * width];
-    py.detach(|| batch.gradient(&cone, &mut out));
+    py.detach(|| batch.gradient(&cone, &mut out))
+        .map_err(raise)?;
     PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
@@ -229,7 +243,8 @@ pub fn quality_at_least<'py>(
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![false; batch.centers.len()];
-    py.detach(|| batch.is_at_least(&cone, threshold, &mut out));
+    py.detach(|| batch.is_at_least(&cone, threshold, &mut out))
+        .map_err(raise)?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -242,13 +257,14 @@ pub fn extreme_quality(
     largest: bool,
 ) -> PyResult<Option<(usize, f64)>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
-    Ok(py.detach(|| {
+    py.detach(|| {
         if largest {
             batch.largest(&cone)
         } else {
             batch.smallest(&cone)
         }
-    }))
+    })
+    .map_err(raise)
 }
 
 /// Bounds of the quality with circular cones of n grasps.
@@ -261,7 +277,8 @@ pub fn circular_quality<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![[0.0; 2]; batch.centers.len()];
-    py.detach(|| batch.circular(&cone, tolerance, &mut out));
+    py.detach(|| batch.circular(&cone, tolerance, &mut out))
+        .map_err(raise)?;
     table(py, out)
 }
 
@@ -317,9 +334,9 @@ pub fn contact_forces<'py>(
     let normals = vectors(normals.as_slice()?);
     let mut forces = Vec::with_capacity(normals.len() * edges * 3);
     for (&normal, &friction) in normals.iter().zip(friction.as_slice()?) {
-        let cone = FrictionCone::new(friction, edges).map_err(crate::raise)?;
+        let cone = FrictionCone::new(friction, edges).map_err(raise)?;
         let frame = Frame::new(normal.into());
-        forces.extend((0..edges).flat_map(|j| cone.edge(&frame, j).to_array()));
+        forces.extend((0..edges).flat_map(|j| cone.edge(0, &frame, j).to_array()));
     }
     PyArray1::from_vec(py, forces).reshape([normals.len(), edges, 3])
 }

@@ -7,7 +7,7 @@
 //! gain that comes. No step with q_k + ⟨∇q_k, d⟩ > Q for all k: a maximum.
 
 use crate::nnls::shortest_step;
-use crate::quality::{Evaluator, quality_of};
+use crate::quality::Evaluator;
 use crate::surface::Surface;
 use glam::DVec3;
 use std::f64::consts::TAU;
@@ -61,8 +61,7 @@ impl Climber<'_> {
             return 0.0;
         }
         let contacts = at.map(|[u, theta]| self.surface.contact(u, theta));
-        let vertex = evaluator.kernel.longest_up_to(&contacts, self.center, bar);
-        vertex.map_or(0.0, quality_of)
+        evaluator.quality_up_to(&contacts, self.center, bar)
     }
 
     fn allowed(&self, at: &Coordinates) -> bool {

@@ -13,28 +13,40 @@ pub struct Contact {
     pub normal: DVec3,
 }
 
-/// The polygonal friction cone about e₃, and its polar cone: what every contact rotates.
+/// The polygonal friction cones of a grasp's contacts about e₃, and their polar cones: what the
+/// contact frames rotate.
 ///
 /// Edge j is f_j = (μ cos φ_j, μ sin φ_j, 1) with φ_j = 2πj/l. The polar cone has the l extreme
 /// rays (cos ψ_j, sin ψ_j, −μ cos(π/l)), ψ_j = 2π(j + ½)/l; ray j is orthogonal to the edges
-/// j and j + 1.
+/// j and j + 1. All contacts have the same number of edges; each may have a μ of its own.
 #[derive(Debug, Clone)]
 pub struct FrictionCone {
-    friction: f64,
+    /// One for all contacts, or one for each.
+    frictions: Vec<f64>,
     torsion: f64,
-    /// (cos φ_j, sin φ_j), already multiplied by μ.
+    /// (cos φ_j, sin φ_j).
     pub(crate) edges: Vec<[f64; 2]>,
     /// (cos ψ_j, sin ψ_j).
     pub(crate) rays: Vec<[f64; 2]>,
-    /// Component of every ray along the normal: −μ cos(π/l).
-    pub(crate) ray_height: f64,
+    /// cos(π/l).
+    pub(crate) inner: f64,
 }
 
 impl FrictionCone {
     /// The cone of friction coefficient μ = `friction` with l = `edges` edges; a ray for μ = 0.
     pub fn new(friction: f64, edges: usize) -> Result<Self, Error> {
-        if !(friction.is_finite() && friction >= 0.0) {
-            return Err(Error::Friction(friction));
+        Self::each(&[friction], edges)
+    }
+
+    /// Cones with a friction coefficient for each contact; a single one is that of all.
+    pub fn each(frictions: &[f64], edges: usize) -> Result<Self, Error> {
+        if frictions.is_empty() {
+            return Err(Error::Friction(f64::NAN));
+        }
+        for &friction in frictions {
+            if !(friction.is_finite() && friction >= 0.0) {
+                return Err(Error::Friction(friction));
+            }
         }
         if edges < 3 {
             return Err(Error::Edges(edges));
@@ -45,13 +57,11 @@ impl FrictionCone {
         };
         // The paper counts j = 1…l; j = 0 and j = l are the same edge, so the set is the same.
         Ok(Self {
-            friction,
+            frictions: frictions.to_vec(),
             torsion: 0.0,
-            edges: (0..edges)
-                .map(|j| at(j as f64).map(|x| friction * x))
-                .collect(),
+            edges: (0..edges).map(|j| at(j as f64)).collect(),
             rays: (0..edges).map(|j| at(j as f64 + 0.5)).collect(),
-            ray_height: -friction * (TAU / (2.0 * edges as f64)).cos(),
+            inner: (TAU / (2.0 * edges as f64)).cos(),
         })
     }
 
@@ -75,18 +85,42 @@ impl FrictionCone {
         self.len() + if self.torsion > 0.0 { 2 } else { 0 }
     }
 
-    /// Force in the contact frame and torque about the normal of a generator.
-    pub(crate) fn generator(&self, index: usize) -> ([f64; 3], f64) {
-        match self.edges.get(index) {
-            Some(&[x, y]) => ([x, y, 1.0], 0.0),
-            None if index == self.len() => ([0.0, 0.0, 1.0], self.torsion),
-            None => ([0.0, 0.0, 1.0], -self.torsion),
+    /// Force in the contact frame and torque about the normal of a generator of a contact.
+    pub(crate) fn generator(&self, contact: usize, index: usize) -> ([f64; 3], f64) {
+        if index < self.len() {
+            (self.local_edge(contact, index), 0.0)
+        } else if index == self.len() {
+            ([0.0, 0.0, 1.0], self.torsion)
+        } else {
+            ([0.0, 0.0, 1.0], -self.torsion)
         }
     }
 
-    /// Friction coefficient μ.
-    pub fn friction(&self) -> f64 {
-        self.friction
+    /// Friction coefficient μ of a contact.
+    #[inline]
+    pub fn friction(&self, contact: usize) -> f64 {
+        if let [all] = self.frictions[..] {
+            return all;
+        }
+        self.frictions[contact]
+    }
+
+    /// Have all contacts the same friction?
+    #[inline]
+    pub(crate) fn is_uniform(&self) -> bool {
+        self.frictions.len() == 1
+    }
+
+    /// Has any contact friction?
+    #[inline]
+    pub(crate) fn is_rough(&self) -> bool {
+        self.frictions.iter().any(|&friction| friction > 0.0)
+    }
+
+    /// Gives the contacts the friction coefficients of another grasp, finite and not negative.
+    pub(crate) fn set_frictions(&mut self, frictions: &[f64]) {
+        self.frictions.clear();
+        self.frictions.extend_from_slice(frictions);
     }
 
     /// Number of edges l.
@@ -99,10 +133,25 @@ impl FrictionCone {
         false
     }
 
-    /// Edge j of the cone about the normal of `frame`.
-    pub fn edge(&self, frame: &Frame, j: usize) -> DVec3 {
+    /// Edge j of a contact's cone in the contact frame.
+    #[inline]
+    pub(crate) fn local_edge(&self, contact: usize, j: usize) -> [f64; 3] {
+        let friction = self.friction(contact);
         let [x, y] = self.edges[j];
-        frame.turn([x, y, 1.0])
+        [friction * x, friction * y, 1.0]
+    }
+
+    /// Edge j of a contact's cone, whose frame is `frame`.
+    pub fn edge(&self, contact: usize, frame: &Frame, j: usize) -> DVec3 {
+        frame.turn(self.local_edge(contact, j))
+    }
+
+    /// How far a force in a contact's frame is outside of its cone: the largest product with the
+    /// polar cone's rays, not positive inside.
+    pub(crate) fn excess(&self, contact: usize, [x, y, z]: [f64; 3]) -> f64 {
+        let bound = self.friction(contact) * self.inner * z;
+        let along = self.rays.iter().map(|[a, b]| a * x + b * y);
+        along.fold(f64::NEG_INFINITY, f64::max) - bound
     }
 }
 
@@ -217,7 +266,8 @@ mod tests {
             let cone = FrictionCone::new(0.7, l).unwrap();
             for (j, ray) in cone.rays.iter().enumerate() {
                 for (i, edge) in cone.edges.iter().enumerate() {
-                    let product = ray[0] * edge[0] + ray[1] * edge[1] + cone.ray_height;
+                    let across = ray[0] * edge[0] + ray[1] * edge[1];
+                    let product = 0.7 * (across - cone.inner);
                     if i == j || i == (j + 1) % l {
                         assert!(product.abs() < 1e-15);
                     } else {

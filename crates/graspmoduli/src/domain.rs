@@ -163,16 +163,16 @@ fn two_contacts_balance(contacts: &[Contact; 3], cone: &FrictionCone) -> bool {
             return false;
         }
         let force = if along > 0.0 { line } else { -line };
-        holds(cone, n, force) && holds(cone, m, -force)
+        holds(cone, i, n, force) && holds(cone, k, m, -force)
     })
 }
 
-/// Is a force in the friction cone about a normal?
-fn holds(cone: &FrictionCone, normal: DVec3, force: DVec3) -> bool {
-    let frame = Frame::new(normal);
-    let [x, y] = frame.tangents.map(|tangent| tangent.dot(force));
-    let bound = -cone.ray_height * normal.dot(force);
-    cone.rays.iter().all(|[c, s]| c * x + s * y <= bound)
+/// Is a force in the friction cone of a contact with this normal?
+fn holds(cone: &FrictionCone, contact: usize, normal: DVec3, force: DVec3) -> bool {
+    let [x, y] = Frame::new(normal)
+        .tangents
+        .map(|tangent| tangent.dot(force));
+    cone.excess(contact, [x, y, normal.dot(force)]) <= 0.0
 }
 
 /// The smallest Q_l near good grasps: how many of the first `count` grasps of a stream have

@@ -23,6 +23,35 @@ pub enum Error {
     GridTooLarge(usize, usize),
     /// A convex-cone operation with a factor that is not positive and finite.
     Weight(f64),
+    /// The parts of a batch of grasps do not fit each other: how long each is.
+    Batch {
+        /// Contact points.
+        points: usize,
+        /// Normals.
+        normals: usize,
+        /// Centres of mass.
+        centers: usize,
+        /// Friction coefficients, 0 or as many as contact points.
+        frictions: usize,
+    },
+    /// A slice is not as long as it must be.
+    Length {
+        /// Of what.
+        name: &'static str,
+        /// How long it must be.
+        wanted: usize,
+        /// How long it is.
+        got: usize,
+    },
+    /// Rounding kept the expanding polytope from an answer.
+    NotConverged {
+        /// Which grasp.
+        grasp: usize,
+        /// Its quality is at least this,
+        lower: f64,
+        /// and at most this.
+        upper: f64,
+    },
     /// The caller asked to stop.
     Interrupted,
 }
@@ -65,6 +94,29 @@ impl fmt::Display for Error {
             Error::Weight(got) => {
                 write!(out, "weights must be positive finite numbers, got {got}")
             }
+            Error::Batch {
+                points,
+                normals,
+                centers,
+                frictions,
+            } => write!(
+                out,
+                "grasps must have as many contacts as normals and friction coefficients, the same \
+                 number for each centre of mass, got {points} contacts, {normals} normals and \
+                 {frictions} friction coefficients for {centers} centres of mass"
+            ),
+            Error::Length { name, wanted, got } => {
+                write!(out, "{name} must hold {wanted} numbers, got {got}")
+            }
+            Error::NotConverged {
+                grasp,
+                lower,
+                upper,
+            } => write!(
+                out,
+                "contacts must be a grasp whose quality can be computed, got one (number {grasp}) \
+                 of which rounding leaves open where in [{lower}, {upper}] it lies"
+            ),
             Error::Interrupted => write!(out, "interrupted"),
         }
     }

@@ -8,7 +8,7 @@
 
 use crate::contact::{Contact, Frame, FrictionCone};
 use crate::error::Error;
-use crate::quality::{Evaluator, Twist, Weakest};
+use crate::quality::{Evaluator, LARGEST_ERROR, Twist, Weakest};
 use glam::DVec3;
 use multiversion::multiversion;
 use std::ops::ControlFlow;
@@ -20,6 +20,12 @@ const WORDS: usize = 4;
 /// One bit per direction.
 type Mask = [u64; WORDS];
 const DIRECTIONS: usize = 64 * WORDS;
+
+/// A subset is passed over where a bound of Q is below the threshold by so much of the longest
+/// wrench. The bounds are right to rounding, but the values that enter err by the perturbation of
+/// the expanding polytope, which is less than this: what is passed over cannot depend on the order
+/// in which threads come by.
+const MARGIN: f64 = 2.0 * LARGEST_ERROR;
 
 /// Between two calls of the progress function.
 const TICK: Duration = Duration::from_millis(100);
@@ -36,10 +42,13 @@ pub struct Ranked {
 /// The `top` best force-closure grasps among all subsets of `size` of the `contacts`, best first,
 /// equal ones by their indices; fewer if there are fewer. The result does not depend on `threads`.
 ///
+/// `frictions` are the coefficients of the contacts if each has one of its own, else empty.
+///
 /// `progress(done, total)` is called now and then and at the end from the calling thread, in
 /// subsets, and may ask to stop: then the answer is [`Error::Interrupted`].
 pub fn best_subsets(
     contacts: &[Contact],
+    frictions: &[f64],
     center_of_mass: DVec3,
     cone: &FrictionCone,
     size: usize,
@@ -48,19 +57,26 @@ pub fn best_subsets(
     mut progress: impl FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Result<Vec<Ranked>, Error> {
     let n = contacts.len();
+    if !frictions.is_empty() && frictions.len() != n {
+        return Err(Error::Length {
+            name: "frictions",
+            wanted: n,
+            got: frictions.len(),
+        });
+    }
     let total = subsets(n, size);
     if size == 0 || total == 0 || top == 0 {
         return Ok(Vec::new());
     }
     let board = Board::new(top);
-    let mut first = Worker::new(contacts, center_of_mass, cone, size, &board);
+    let mut first = Worker::new(contacts, frictions, center_of_mass, cone, size, &board);
     first.seed(total);
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let done = AtomicU64::new(0);
-    let running = Mutex::new(threads.max(1));
-    let finished = Condvar::new();
+    let running = Running::new(threads.max(1));
     let work = |mut worker: Worker| {
+        let _guard = Leave(&running);
         loop {
             let a = next.fetch_add(1, Ordering::Relaxed);
             if a + size > n || stop.load(Ordering::Relaxed) {
@@ -69,8 +85,6 @@ pub fn best_subsets(
             worker.all_from(&mut vec![a], &stop);
             done.fetch_add(subsets(n - a - 1, size - 1), Ordering::Relaxed);
         }
-        *running.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
-        finished.notify_one();
     };
     let mut report = || {
         if progress(done.load(Ordering::Relaxed), total).is_break() {
@@ -88,24 +102,58 @@ pub fn best_subsets(
                 scope.spawn(|| work(worker));
             }
             scope.spawn(|| work(first));
-            let mut left = running.lock().unwrap_or_else(PoisonError::into_inner);
-            loop {
-                if *left > 0 {
-                    left = finished
-                        .wait_timeout(left, TICK)
-                        .map_or_else(|poisoned| poisoned.into_inner().0, |(guard, _)| guard);
-                }
+            while !running.is_over() {
                 report();
-                if *left == 0 {
-                    break;
-                }
             }
+            report();
         });
     }
     if stop.load(Ordering::Relaxed) {
         return Err(Error::Interrupted);
     }
     Ok(board.into_best())
+}
+
+/// How many workers are at work.
+struct Running {
+    number: Mutex<usize>,
+    changed: Condvar,
+}
+
+impl Running {
+    fn new(number: usize) -> Self {
+        Self {
+            number: Mutex::new(number),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// Waits a little for all workers to end.
+    fn is_over(&self) -> bool {
+        let number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
+        if *number == 0 {
+            return true;
+        }
+        let (number, _) = self
+            .changed
+            .wait_timeout(number, TICK)
+            .unwrap_or_else(PoisonError::into_inner);
+        *number == 0
+    }
+}
+
+/// Counts a worker out, also one that panics, for which nobody must wait.
+struct Leave<'a>(&'a Running);
+
+impl Drop for Leave<'_> {
+    fn drop(&mut self) {
+        let running = self.0;
+        *running
+            .number
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) -= 1;
+        running.changed.notify_one();
+    }
 }
 
 /// The same for some triples only, in the order in which they are worth trying; on this thread.
@@ -117,7 +165,7 @@ pub(crate) fn best_of(
     triples: impl Iterator<Item = [usize; 3]>,
 ) -> Vec<Ranked> {
     let board = Board::new(top);
-    let mut worker = Worker::new(contacts, center_of_mass, cone, 3, &board);
+    let mut worker = Worker::new(contacts, &[], center_of_mass, cone, 3, &board);
     for mut triple in triples {
         if worker.may_enter(&triple) {
             worker.evaluate(&mut triple);
@@ -187,16 +235,19 @@ impl Board {
 #[derive(Clone)]
 struct Worker<'a> {
     contacts: &'a [Contact],
+    /// Of each contact, or empty.
+    frictions: &'a [f64],
     center: DVec3,
     board: &'a Board,
     evaluator: Evaluator,
     /// Contacts per grasp, and those of the grasp that is evaluated.
     size: usize,
     grasp: Vec<Contact>,
+    grasp_frictions: Vec<f64>,
     /// Wrenches of all contacts, `edges` each.
     wrenches: Vec<Twist>,
     edges: usize,
-    /// Rounding error of a support value.
+    /// How far a support value must be below the threshold.
     margin: f64,
     /// Per direction, the maximum of ⟨v, w⟩ over each contact's wrenches.
     supports: Vec<Vec<f64>>,
@@ -210,17 +261,24 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn new(
         contacts: &'a [Contact],
+        frictions: &'a [f64],
         center: DVec3,
         cone: &FrictionCone,
         size: usize,
         board: &'a Board,
     ) -> Self {
+        let mut own = cone.clone();
+        if !frictions.is_empty() {
+            own.set_frictions(frictions);
+        }
+        let own = &own;
         let wrenches: Vec<Twist> = contacts
             .iter()
-            .flat_map(|contact| {
+            .enumerate()
+            .flat_map(|(i, contact)| {
                 let frame = Frame::new(contact.normal);
                 (0..cone.len()).map(move |j| {
-                    let force = cone.edge(&frame, j);
+                    let force = own.edge(i, &frame, j);
                     let torque = (contact.point - center).cross(force);
                     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
                 })
@@ -232,15 +290,16 @@ impl<'a> Worker<'a> {
             .fold(0.0_f64, |longest, x| longest.max(x.abs()));
         Self {
             contacts,
+            frictions,
             center,
             board,
             evaluator: Evaluator::new(cone),
             size,
             grasp: Vec::new(),
+            grasp_frictions: Vec::new(),
             wrenches,
             edges: cone.len(),
-            // The closed form errs by rounding, the expanding polytope by its perturbation.
-            margin: longest * if size == 3 { 1e-13 } else { 1e-10 },
+            margin: longest * MARGIN,
             supports: Vec::new(),
             oldest: 0,
             masks: vec![[0; WORDS]; contacts.len()],
@@ -341,6 +400,12 @@ impl<'a> Worker<'a> {
         }
         self.grasp.clear();
         self.grasp.extend(indices.iter().map(|&i| self.contacts[i]));
+        if !self.frictions.is_empty() {
+            self.grasp_frictions.clear();
+            self.grasp_frictions
+                .extend(indices.iter().map(|&i| self.frictions[i]));
+            self.evaluator.set_frictions(&self.grasp_frictions);
+        }
         let weakest = self
             .evaluator
             .weakest_up_to(&self.grasp, self.center, self.threshold);

@@ -132,9 +132,16 @@ fn within_pool(
             .iter()
             .map(|&[u, theta]| surface.contact(u, theta))
             .collect();
-        let triples = best_subsets(&contacts, center_of_mass, cone, 3, 8 * top, 1, |_, _| {
-            ControlFlow::Continue(())
-        })?;
+        let triples = best_subsets(
+            &contacts,
+            &[],
+            center_of_mass,
+            cone,
+            3,
+            8 * top,
+            1,
+            |_, _| ControlFlow::Continue(()),
+        )?;
         let triples = triples
             .into_iter()
             .map(|ranked| (three(&ranked).map(|i| samples[i]), ranked.quality))

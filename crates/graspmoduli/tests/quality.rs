@@ -46,7 +46,7 @@ fn support(cone: &FrictionCone, contacts: &[Contact], center: DVec3, v: [DVec3; 
     for contact in contacts {
         let frame = Frame::new(contact.normal);
         for j in 0..cone.len() {
-            let force = cone.edge(&frame, j);
+            let force = cone.edge(0, &frame, j);
             let torque = (contact.point - center).cross(force);
             largest = largest.max(v[0].dot(force) + v[1].dot(torque));
         }
@@ -83,7 +83,7 @@ fn displacement(cone: &FrictionCone, a: &[Contact], b: &[Contact], center: DVec3
     for (one, other) in a.iter().zip(b) {
         let (before, after) = (Frame::new(one.normal), Frame::new(other.normal));
         for j in 0..cone.len() {
-            let (f, g) = (cone.edge(&before, j), cone.edge(&after, j));
+            let (f, g) = (cone.edge(0, &before, j), cone.edge(0, &after, j));
             let torque = (one.point - center).cross(f) - (other.point - center).cross(g);
             largest = largest.max((f.distance_squared(g) + torque.length_squared()).sqrt());
         }
@@ -285,15 +285,16 @@ fn batches_agree_with_single_grasps() {
         .collect();
     let normals: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| -x)).collect();
     let many = Batch {
+        frictions: &[],
         points: &points.repeat(1000),
         normals: &normals.repeat(1000),
         centers: &[[0.0; 3]].repeat(1000),
     };
     let mut out = vec![0.0; 1000];
-    many.quality(&cone, Norm::Sum, &mut out);
+    many.quality(&cone, Norm::Sum, &mut out).unwrap();
     assert!(out.iter().all(|q| (q - 0.544232186874).abs() < 5e-13));
     let width = Gradient::width(3);
     let mut gradients = vec![0.0; 1000 * width];
-    many.gradient(&cone, &mut gradients);
+    many.gradient(&cone, &mut gradients).unwrap();
     assert!(gradients.chunks(width).all(|row| row[0] == out[0]));
 }

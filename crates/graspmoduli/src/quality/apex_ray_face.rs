@@ -1,8 +1,8 @@
 //! Vertices of P with one velocity at the apex of its cone, one on a ray and one on a face.
 
-use super::Twist;
 use super::lanes::{Lane, Number, dot, load, splat_each, store};
 use super::plane::{LANES, Lanes, Plane, at};
+use super::r6::Twist;
 use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, ray};
 use glam::DVec2;
 use pulp::Simd;

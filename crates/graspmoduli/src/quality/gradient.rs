@@ -6,8 +6,7 @@
 //! torques and V_i the velocity of contact i under v: ∂Q/∂c_i = F_i × v_ω, ∂Q/∂z = −Σ ∂Q/∂c_i, and
 //! ∂Q/∂n_i is the gradient of ⟨V_i, R(n_i) g_i⟩ + s_i ⟨v_ω, n_i⟩ with g_i = R(n_i)ᵀ F_i held fixed.
 
-use super::Twist;
-use super::polytope::dot;
+use super::r6::{Twist, dot, solve};
 use super::three_contacts::{Active, Vertex};
 use super::wrenches::Wrenches;
 use crate::contact::{Contact, Frame, FrictionCone};
@@ -57,21 +56,22 @@ type Share = ([f64; 3], f64);
 /// Distance of the facet that belongs to a vertex of P and its gradient, into `row`; false if the
 /// foot point is not in the span of the facet to rounding.
 ///
-/// `nearest` says that the facet is the nearest to the origin: then weights that came out negative,
-/// because more wrenches than six are active, are found anew among all of them.
+/// `order` are the places of the vertex's contacts among `contacts`. `nearest` says that the facet
+/// is the nearest to the origin: then weights that came out negative, because more wrenches than
+/// six are active, are found anew among all of them.
 #[inline(always)]
 pub(super) fn of_vertex(
     vertex: &Vertex,
-    contacts: &[Contact; 3],
+    order: [usize; 3],
+    contacts: &[Contact],
     center: DVec3,
     cone: &FrictionCone,
     nearest: bool,
     row: &mut [f64],
 ) -> bool {
     let l = cone.len();
-    let value = 1.0 / vertex.norm_squared.sqrt();
+    let value = vertex.quality();
     let direction = vertex.twist.map(|x| x * value);
-    let frames = contacts.map(|contact| Frame::new(contact.normal));
     // The apex of a cone activates all its edges; any three of them span the force.
     let active = match vertex.active {
         Active::Rays(j) => std::array::from_fn(|k| (k / 2, (j[k / 2] + k % 2) % l)),
@@ -83,9 +83,11 @@ pub(super) fn of_vertex(
             (ray.0, (ray.1 + 1) % l),
             edge,
         ],
-    };
+    }
+    .map(|(place, j)| (order[place], j));
+    let frames: [Frame; 3] = std::array::from_fn(|i| Frame::new(contacts[i].normal));
     let wrenches = active.map(|(i, j)| {
-        let force = cone.edge(&frames[i], j);
+        let force = cone.edge(i, &frames[i], j);
         let torque = (contacts[i].point - center).cross(force);
         [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     });
@@ -94,30 +96,26 @@ pub(super) fn of_vertex(
     let weights = solve(rows, direction.map(|x| x * value));
     if let Some(weights) = weights {
         for ((i, j), weight) in active.into_iter().zip(weights) {
-            let [x, y] = cone.edges[j];
+            let [x, y, z] = cone.local_edge(i, j);
             let force = &mut shares[i].0;
             *force = [
                 force[0] + x * weight,
                 force[1] + y * weight,
-                force[2] + weight,
+                force[2] + z * weight,
             ];
         }
     }
     // The apex's three edges may have negative weights while its force is within the cone.
-    let within = weights.is_some()
-        && (!nearest
-            || shares.iter().all(|([x, y, z], _)| {
-                cone.rays
-                    .iter()
-                    .all(|[a, b]| a * x + b * y + cone.ray_height * z <= NEGATIVE)
-            }));
+    let within =
+        weights.is_some() && (!nearest || (0..3).all(|i| cone.excess(i, shares[i].0) <= NEGATIVE));
     if !within {
+        let mut all = Wrenches::new();
         let found = nearest && {
-            let mut all = Wrenches::new();
-            all.set(contacts, center, cone, super::Norm::Sum);
+            all.set(contacts, &order, center, cone, super::Norm::Sum);
             foot_point(&all, &direction, value, cone, &mut shares)
         };
-        if !found && weights.is_none() {
+        // Weights that left the cone are no element of the generalised gradient.
+        if !found && (nearest || weights.is_none()) {
             return false;
         }
     }
@@ -164,7 +162,7 @@ pub(super) fn foot_point(
     }
     shares.fill(Share::default());
     for ((i, k), weight) in active.into_iter().zip(weights) {
-        let ([x, y, z], spin) = cone.generator(k);
+        let ([x, y, z], spin) = cone.generator(i, k);
         let (force, torque) = &mut shares[i];
         *force = [
             force[0] + x * weight,
@@ -203,38 +201,4 @@ pub(super) fn differentiate(
         total -= along;
     }
     vectors[2 * m] = total.to_array();
-}
-
-/// The x with ⟨rows_k, x⟩ = right_k, by Gaussian elimination with partial pivoting; `None` if the
-/// rows are dependent.
-#[inline(always)]
-pub(super) fn solve(rows: [Twist; 6], right: Twist) -> Option<Twist> {
-    let mut rows: [[f64; 7]; 6] =
-        std::array::from_fn(|r| std::array::from_fn(|c| if c < 6 { rows[r][c] } else { right[r] }));
-    for step in 0..6 {
-        let mut pivot = step;
-        for row in step + 1..6 {
-            if rows[row][step].abs() > rows[pivot][step].abs() {
-                pivot = row;
-            }
-        }
-        rows.swap(step, pivot);
-        let head = rows[step];
-        // Torques carry the unit of length, so only an exact zero is independent of it.
-        if head[step] == 0.0 {
-            return None;
-        }
-        for row in &mut rows[step + 1..] {
-            let factor = row[step] / head[step];
-            for c in step..7 {
-                row[c] -= factor * head[c];
-            }
-        }
-    }
-    let mut x = [0.0; 6];
-    for step in (0..6).rev() {
-        let known: f64 = (step + 1..6).map(|c| rows[step][c] * x[c]).sum();
-        x[step] = (rows[step][6] - known) / rows[step][step];
-    }
-    x.iter().all(|x| x.is_finite()).then_some(x)
 }

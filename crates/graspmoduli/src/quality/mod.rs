@@ -8,33 +8,45 @@ mod gradient;
 mod lanes;
 mod plane;
 mod polytope;
+mod r6;
 mod ray_ray_ray;
+mod surround;
 mod three_contacts;
 mod velocity;
 mod wrenches;
 
 pub use gradient::Gradient;
-pub(crate) use three_contacts::{Kernel, Vertex};
+pub(crate) use polytope::LARGEST_ERROR;
+pub use r6::Twist;
 pub use wrenches::Norm;
 
 use crate::contact::{Contact, FrictionCone};
+use crate::error::Error;
 use glam::DVec3;
 use polytope::{Distance, Polytope};
 use rayon::prelude::*;
+use std::cmp::Ordering as CompareOrdering;
 use std::sync::atomic::{AtomicU64, Ordering};
+use three_contacts::Kernel;
 use wrenches::{Circular, Wrenches};
 
-/// A twist (v, ω) or a wrench (force, torque).
-pub type Twist = [f64; 6];
+/// Beyond so many edges per cone the expanding polytope is faster than the closed form.
+const MOST_EDGES: usize = 64;
 
 /// Working memory that evaluates grasps one after the other without allocating.
+///
+/// Contacts may come in any order: they are looked at in an order of their own, so that the same
+/// grasp has the same quality to the bit.
 #[derive(Debug, Clone)]
 pub struct Evaluator {
     cone: FrictionCone,
-    pub(crate) kernel: Kernel,
+    kernel: Kernel,
     polytope: Polytope,
     wrenches: Wrenches,
+    /// The order in which contacts are looked at.
+    order: Vec<usize>,
     evaluations: usize,
+    unconverged: Option<[f64; 2]>,
 }
 
 /// A grasp's quality with the direction in which it is least.
@@ -56,7 +68,9 @@ impl Evaluator {
             kernel: Kernel::new(cone),
             polytope: Polytope::default(),
             wrenches: Wrenches::new(),
+            order: Vec::new(),
             evaluations: 0,
+            unconverged: None,
         }
     }
 
@@ -65,26 +79,35 @@ impl Evaluator {
         self.evaluations
     }
 
+    /// Bounds of the last quality that could not be computed, if there was one since this was
+    /// asked: its value was the lower bound. No such grasp is known; should rounding ever keep the
+    /// expanding polytope from an answer, it is not hidden.
+    pub fn take_unconverged(&mut self) -> Option<[f64; 2]> {
+        self.unconverged.take()
+    }
+
+    /// Gives the contacts of the grasps that follow friction coefficients of their own, finite and
+    /// not negative.
+    pub(crate) fn set_frictions(&mut self, frictions: &[f64]) {
+        self.cone.set_frictions(frictions);
+    }
+
     /// Exact Q_l; 0 if the origin is not in the interior of the wrench hull.
     #[inline]
     pub fn quality(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
         self.evaluations += 1;
-        match self.closed_form(contacts) {
-            Some(three) => self
-                .kernel
-                .longest(three, center_of_mass)
-                .map_or(0.0, quality_of),
-            None => {
-                self.distance(contacts, center_of_mass, Norm::Sum, never)
-                    .upper
-            }
+        if let Some((three, _)) = self.closed_form(contacts)
+            && let Ok(longest) = self.kernel.longest(&three, center_of_mass)
+        {
+            return longest.map_or(0.0, |vertex| vertex.quality());
         }
+        self.expanded(contacts, center_of_mass, Norm::Sum, never)
     }
 
     /// Exact Q'_l: every finger's normal force is at most 1, instead of their sum.
     pub fn quality_of_each(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
-        self.distance(contacts, center_of_mass, Norm::Each, never)
-            .upper
+        self.evaluations += 1;
+        self.expanded(contacts, center_of_mass, Norm::Each, never)
     }
 
     /// Is Q_l ≥ `threshold`? The same as comparing, but ends as soon as it is known.
@@ -98,25 +121,22 @@ impl Evaluator {
         threshold <= 0.0 || self.quality_up_to(contacts, center_of_mass, threshold) >= threshold
     }
 
-    /// Q_l if it is at least `threshold`, else some number between Q_l and `threshold`.
+    /// Q_l if it is at least `threshold`, else some number between Q_l and `threshold`, which is
+    /// below it.
     #[inline]
-    fn quality_up_to(
+    pub(crate) fn quality_up_to(
         &mut self,
         contacts: &[Contact],
         center_of_mass: DVec3,
         threshold: f64,
     ) -> f64 {
-        match self.closed_form(contacts) {
-            Some(three) => self
-                .kernel
-                .longest_up_to(three, center_of_mass, threshold)
-                .map_or(0.0, quality_of),
-            None => {
-                let below = |_, upper| upper < threshold;
-                self.distance(contacts, center_of_mass, Norm::Sum, below)
-                    .upper
-            }
+        if let Some((three, _)) = self.closed_form(contacts)
+            && let Ok(longest) = self.kernel.longest_up_to(&three, center_of_mass, threshold)
+        {
+            return longest.map_or(0.0, |vertex| vertex.quality());
         }
+        let below = |_, upper| upper < threshold;
+        self.expanded(contacts, center_of_mass, Norm::Sum, below)
     }
 
     /// As [`Evaluator::weakest`] if Q_l is at least `threshold`; else some unit direction in which
@@ -127,31 +147,19 @@ impl Evaluator {
         center_of_mass: DVec3,
         threshold: f64,
     ) -> Option<Weakest> {
-        let Some(three) = self.closed_form(contacts) else {
-            let below = |_, upper| upper < threshold;
-            let distance = self.distance(contacts, center_of_mass, Norm::Sum, below);
-            return (distance != Distance::ZERO).then(|| self.unscaled(&distance));
-        };
-        let vertex = self
-            .kernel
-            .longest_up_to(three, center_of_mass, threshold)?;
-        let quality = quality_of(vertex);
-        Some(Weakest {
-            quality,
-            direction: vertex.twist.map(|x| x * quality),
-        })
-    }
-
-    /// The distance with its direction in the object frame.
-    fn unscaled(&self, distance: &Distance) -> Weakest {
-        let scale = self.wrenches.scale;
-        let [a, b, c, d, e, f] = distance.direction;
-        let direction = [a, b, c, d / scale, e / scale, f / scale];
-        let length = polytope::dot(&direction, &direction).sqrt();
-        Weakest {
-            quality: distance.upper,
-            direction: direction.map(|x| x / length),
+        if let Some((three, _)) = self.closed_form(contacts)
+            && let Ok(longest) = self.kernel.longest_up_to(&three, center_of_mass, threshold)
+        {
+            let vertex = longest?;
+            let quality = vertex.quality();
+            return Some(Weakest {
+                quality,
+                direction: vertex.twist.map(|x| x * quality),
+            });
         }
+        let below = |_, upper| upper < threshold;
+        let distance = self.distance(contacts, center_of_mass, Norm::Sum, below)?;
+        Some(self.unscaled(&distance))
     }
 
     /// Q_l if it is below `threshold`, else `threshold`.
@@ -162,16 +170,15 @@ impl Evaluator {
         center_of_mass: DVec3,
         threshold: f64,
     ) -> f64 {
-        let quality = match self.closed_form(contacts) {
-            Some(three) => self
-                .kernel
-                .longest_above(three, center_of_mass, threshold)
-                .map_or(0.0, |vertex| vertex.map_or(threshold, quality_of)),
-            None => {
-                let above = |lower, _| lower >= threshold;
-                self.distance(contacts, center_of_mass, Norm::Sum, above)
-                    .upper
-            }
+        let quality = if let Some((three, _)) = self.closed_form(contacts)
+            && let Ok(longest) = self.kernel.longest_above(&three, center_of_mass, threshold)
+        {
+            longest.map_or(0.0, |vertex| {
+                vertex.map_or(threshold, |vertex| vertex.quality())
+            })
+        } else {
+            let above = |lower, _| lower >= threshold;
+            self.expanded(contacts, center_of_mass, Norm::Sum, above)
         };
         quality.min(threshold)
     }
@@ -185,21 +192,37 @@ impl Evaluator {
         Gradient::from_row(&row)
     }
 
-    /// [`Evaluator::gradient`] into memory that is all 0, laid out as [`Gradient::width`] says.
+    /// [`Evaluator::gradient`] into memory that is laid out as [`Gradient::width`] says.
     #[inline]
     fn gradient_row(&mut self, contacts: &[Contact], center: DVec3, row: &mut [f64]) {
         self.evaluations += 1;
-        if let Some(three) = self.closed_form(contacts) {
-            if let Some(vertex) = self.kernel.longest(three, center) {
-                row[0] = quality_of(vertex);
-                gradient::of_vertex(&vertex, three, center, &self.cone, true, row);
+        row.fill(0.0);
+        if let Some((three, order)) = self.closed_form(contacts)
+            && let Ok(longest) = self.kernel.longest(&three, center)
+        {
+            if let Some(vertex) = longest
+                && !gradient::of_vertex(&vertex, order, contacts, center, &self.cone, true, row)
+            {
+                // The value is right all the same.
+                row[0] = vertex.quality();
             }
             return;
         }
         let weakest = self.weakest(contacts, center, Norm::Sum);
-        if weakest.quality > 0.0 {
-            row[0] = weakest.quality;
-            let Weakest { quality, direction } = weakest;
+        self.foot_point_row(&weakest, contacts, center, row);
+    }
+
+    /// Value and gradient of the nearest facet, by all wrenches that lie on it.
+    fn foot_point_row(
+        &mut self,
+        weakest: &Weakest,
+        contacts: &[Contact],
+        center: DVec3,
+        row: &mut [f64],
+    ) {
+        let Weakest { quality, direction } = *weakest;
+        row[0] = quality;
+        if quality > 0.0 {
             let mut shares = vec![Default::default(); contacts.len()];
             let (wrenches, cone) = (&self.wrenches, &self.cone);
             if gradient::foot_point(wrenches, &direction, quality, cone, &mut shares) {
@@ -211,7 +234,7 @@ impl Evaluator {
     /// The quality by the expanding polytope, whatever the number of contacts, with the direction in
     /// which the grasp is weakest.
     pub fn weakest(&mut self, contacts: &[Contact], center: DVec3, norm: Norm) -> Weakest {
-        self.wrenches.set(contacts, center, &self.cone, norm);
+        self.set_wrenches(contacts, center, norm);
         let scale = self.wrenches.scale;
         if !usable(scale) {
             // All contacts at the centre of mass, or infinitely far: there is no torque.
@@ -222,6 +245,7 @@ impl Evaluator {
         }
         let distance = self.polytope.distance(&self.wrenches, scale, never);
         let mut weakest = self.unscaled(&distance);
+        weakest.quality = self.value(&distance);
         if self.too_few(contacts) {
             weakest.quality = 0.0;
         }
@@ -236,14 +260,17 @@ impl Evaluator {
         center_of_mass: DVec3,
         tolerance: f64,
     ) -> (f64, f64) {
+        self.evaluations += 1;
         let scale = wrenches::scale(contacts, center_of_mass, 0.0);
         if self.too_few(contacts) || !usable(scale) {
             return (0.0, 0.0);
         }
+        self.sort(contacts);
         let hull = Circular {
             contacts,
+            order: &self.order,
             center: center_of_mass,
-            friction: self.cone.friction(),
+            cone: &self.cone,
             scale,
         };
         let met = |lower, upper| upper - lower <= tolerance * upper;
@@ -251,19 +278,34 @@ impl Evaluator {
         (distance.lower, distance.upper)
     }
 
-    /// The contacts of a grasp that has a closed form.
+    /// The contacts of a grasp that has a closed form in their order, and the order; sets the
+    /// kernel's friction.
     #[inline]
-    fn closed_form<'a>(&self, contacts: &'a [Contact]) -> Option<&'a [Contact; 3]> {
-        if self.cone.torsion() > 0.0 {
+    fn closed_form(&mut self, contacts: &[Contact]) -> Option<([Contact; 3], [usize; 3])> {
+        let three: &[Contact; 3] = contacts.try_into().ok()?;
+        if self.cone.torsion() > 0.0 || self.cone.len() > MOST_EDGES {
             return None;
         }
-        contacts.try_into().ok()
+        let [a, b, c] = three;
+        let order = match (before(b, a), before(c, b), before(c, a)) {
+            (false, false, _) => [0, 1, 2],
+            (true, false, false) => [1, 0, 2],
+            (false, true, false) => [0, 2, 1],
+            (false, true, true) => [2, 0, 1],
+            (true, false, true) => [1, 2, 0],
+            (true, true, _) => [2, 1, 0],
+        };
+        if !self.cone.is_uniform() {
+            let frictions = order.map(|i| self.cone.friction(i));
+            self.kernel.set_frictions(&self.cone, frictions);
+        }
+        Some((order.map(|i| three[i]), order))
     }
 
     /// Two hard contacts cannot resist a twist about their line, one of any kind cannot pull, and
     /// without friction it takes seven wrenches to surround the origin of R⁶: else Q is exactly 0.
     fn too_few(&self, contacts: &[Contact]) -> bool {
-        let fewest = match (self.cone.torsion() > 0.0, self.cone.friction() > 0.0) {
+        let fewest = match (self.cone.torsion() > 0.0, self.cone.is_rough()) {
             (true, true) => 2,
             (false, true) => 3,
             (true, false) => 4,
@@ -272,19 +314,76 @@ impl Evaluator {
         contacts.len() < fewest
     }
 
+    /// Puts the contacts into their order.
+    fn sort(&mut self, contacts: &[Contact]) {
+        self.order.clear();
+        self.order.extend(0..contacts.len());
+        let cone = &self.cone;
+        self.order.sort_by(|&a, &b| {
+            compare(&contacts[a], &contacts[b])
+                .then_with(|| cone.friction(a).total_cmp(&cone.friction(b)))
+        });
+    }
+
+    fn set_wrenches(&mut self, contacts: &[Contact], center: DVec3, norm: Norm) {
+        self.sort(contacts);
+        self.wrenches
+            .set(contacts, &self.order, center, &self.cone, norm);
+    }
+
+    /// By the expanding polytope; `None` where Q = 0 for want of contacts or of lever arms.
     fn distance(
         &mut self,
         contacts: &[Contact],
         center: DVec3,
         norm: Norm,
         enough: impl FnMut(f64, f64) -> bool,
-    ) -> Distance {
-        self.wrenches.set(contacts, center, &self.cone, norm);
+    ) -> Option<Distance> {
+        self.set_wrenches(contacts, center, norm);
         let scale = self.wrenches.scale;
         if self.too_few(contacts) || !usable(scale) {
-            return Distance::ZERO;
+            return None;
         }
-        self.polytope.distance(&self.wrenches, scale, enough)
+        Some(self.polytope.distance(&self.wrenches, scale, enough))
+    }
+
+    /// The value by the expanding polytope.
+    fn expanded(
+        &mut self,
+        contacts: &[Contact],
+        center: DVec3,
+        norm: Norm,
+        enough: impl FnMut(f64, f64) -> bool,
+    ) -> f64 {
+        match self.distance(contacts, center, norm, enough) {
+            Some(distance) => self.value(&distance),
+            None => 0.0,
+        }
+    }
+
+    /// The distance, or its lower bound if it is not known, which is remembered.
+    fn value(&mut self, distance: &Distance) -> f64 {
+        if distance.converged {
+            return distance.upper;
+        }
+        self.unconverged = Some([distance.lower, distance.upper]);
+        distance.lower
+    }
+
+    /// The distance with its direction in the object frame.
+    fn unscaled(&self, distance: &Distance) -> Weakest {
+        let scale = self.wrenches.scale;
+        let [a, b, c, d, e, f] = distance.direction;
+        // Both scalings are the same direction; this one does not overflow.
+        let direction = if scale >= 1.0 {
+            [a, b, c, d / scale, e / scale, f / scale]
+        } else {
+            [a * scale, b * scale, c * scale, d, e, f]
+        };
+        Weakest {
+            quality: distance.upper,
+            direction: r6::unit(&direction).0,
+        }
     }
 
     /// Gradients of the distances to the facets within `distance` of the origin, at most `most`,
@@ -297,37 +396,64 @@ impl Evaluator {
         most: usize,
     ) -> Option<Vec<Gradient>> {
         self.evaluations += 1;
-        let cone = &self.cone;
-        let vertices = self
-            .kernel
-            .within(contacts, center_of_mass, distance, most)?;
         let mut row = [0.0; 22];
         let mut gradients = Vec::new();
-        for vertex in vertices {
-            if gradient::of_vertex(vertex, contacts, center_of_mass, cone, false, &mut row) {
-                gradients.push(Gradient::from_row(&row));
+        if let Some((three, order)) = self.closed_form(contacts)
+            && let Ok(vertices) = self.kernel.within(&three, center_of_mass, distance, most)
+        {
+            let cone = &self.cone;
+            for vertex in vertices? {
+                if gradient::of_vertex(
+                    vertex,
+                    order,
+                    contacts,
+                    center_of_mass,
+                    cone,
+                    false,
+                    &mut row,
+                ) {
+                    gradients.push(Gradient::from_row(&row));
+                }
             }
+        } else {
+            // Of grasps at the limit of what the closed form can tell, the nearest facet only.
+            let weakest = self.weakest(contacts, center_of_mass, Norm::Sum);
+            self.foot_point_row(&weakest, contacts, center_of_mass, &mut row);
+            gradients.extend((weakest.quality > 0.0).then(|| Gradient::from_row(&row)));
         }
         (!gradients.is_empty()).then_some(gradients)
     }
 }
 
-/// Lever arms whose squares are numbers.
+/// Lever arms that are numbers, and not all 0.
 fn usable(scale: f64) -> bool {
-    scale * scale > 0.0 && (scale * scale).is_finite()
+    scale > 0.0 && scale.is_finite()
 }
 
 fn never(_: f64, _: f64) -> bool {
     false
 }
 
-/// Q_l of a grasp from its longest admissible twist.
-pub(crate) fn quality_of(vertex: Vertex) -> f64 {
-    1.0 / vertex.norm_squared.sqrt()
+/// Does a contact come before another in the order of [`compare`]?
+#[inline(always)]
+fn before(a: &Contact, b: &Contact) -> bool {
+    if a.point.x == b.point.x {
+        compare(a, b).is_lt()
+    } else {
+        a.point.x < b.point.x
+    }
+}
+
+/// Contacts by their points and then by their normals, coordinate by coordinate.
+fn compare(a: &Contact, b: &Contact) -> CompareOrdering {
+    let keys = |c: &Contact| [c.point, c.normal].map(|v| v.to_array());
+    keys(a)
+        .partial_cmp(&keys(b))
+        .unwrap_or(CompareOrdering::Equal)
 }
 
 /// Grasps in one piece of memory: of grasp g, contact i is `points[g·m + i]`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Batch<'a> {
     /// Contact points, m per grasp.
     pub points: &'a [[f64; 3]],
@@ -335,6 +461,8 @@ pub struct Batch<'a> {
     pub normals: &'a [[f64; 3]],
     /// Centre of mass, one per grasp.
     pub centers: &'a [[f64; 3]],
+    /// Friction coefficients, m per grasp; if empty, those of the friction cone.
+    pub frictions: &'a [f64],
 }
 
 /// Grasps per unit of parallel work: long enough to pay for its start, short enough to share.
@@ -342,7 +470,7 @@ const CHUNK: usize = 256;
 
 impl Batch<'_> {
     /// Exact Q_l or Q'_l of every grasp, in parallel on the current rayon pool.
-    pub fn quality(&self, cone: &FrictionCone, norm: Norm, out: &mut [f64]) {
+    pub fn quality(&self, cone: &FrictionCone, norm: Norm, out: &mut [f64]) -> Result<(), Error> {
         match norm {
             Norm::Sum => self.each(cone, out, 1, |evaluator, contacts, center, slot| {
                 slot[0] = evaluator.quality(contacts, center);
@@ -353,30 +481,39 @@ impl Batch<'_> {
         }
     }
 
-    /// Exact Q_l and gradient of every grasp, a row of [`Gradient::width`] each, in parallel. `out`
-    /// comes filled with zeros.
-    pub fn gradient(&self, cone: &FrictionCone, out: &mut [f64]) {
-        let width = Gradient::width(self.contacts_per_grasp());
-        self.each(cone, out, width, Evaluator::gradient_row);
+    /// Exact Q_l and gradient of every grasp, a row of [`Gradient::width`] each, in parallel.
+    pub fn gradient(&self, cone: &FrictionCone, out: &mut [f64]) -> Result<(), Error> {
+        let width = Gradient::width(self.contacts_per_grasp()?);
+        self.each(cone, out, width, Evaluator::gradient_row)
     }
 
     /// Whether Q_l ≥ `threshold` of every grasp, in parallel.
-    pub fn is_at_least(&self, cone: &FrictionCone, threshold: f64, out: &mut [bool]) {
+    pub fn is_at_least(
+        &self,
+        cone: &FrictionCone,
+        threshold: f64,
+        out: &mut [bool],
+    ) -> Result<(), Error> {
         self.each(cone, out, 1, |evaluator, contacts, center, slot| {
             slot[0] = evaluator.is_at_least(contacts, center, threshold);
-        });
+        })
     }
 
     /// Bounds of the quality with circular cones of every grasp, in parallel.
-    pub fn circular(&self, cone: &FrictionCone, tolerance: f64, out: &mut [[f64; 2]]) {
+    pub fn circular(
+        &self,
+        cone: &FrictionCone,
+        tolerance: f64,
+        out: &mut [[f64; 2]],
+    ) -> Result<(), Error> {
         self.each(cone, out, 1, |evaluator, contacts, center, slot| {
             slot[0] = evaluator.circular(contacts, center, tolerance).into();
-        });
+        })
     }
 
     /// Index and Q_l of the best grasp, the first among equals, in parallel: a grasp is given up
     /// as soon as it is known to be worse than the best so far. `None` if there are no grasps.
-    pub fn largest(&self, cone: &FrictionCone) -> Option<(usize, f64)> {
+    pub fn largest(&self, cone: &FrictionCone) -> Result<Option<(usize, f64)>, Error> {
         // Bits of numbers that are not negative order as the numbers do.
         let bar = AtomicU64::new(0);
         self.first(cone, |evaluator, contacts, center| {
@@ -389,16 +526,16 @@ impl Batch<'_> {
 
     /// Index and Q_l of the worst grasp, the first among equals, in parallel: a grasp is given up
     /// as soon as it is known not to be worse than the worst so far. `None` if there are no grasps.
-    pub fn smallest(&self, cone: &FrictionCone) -> Option<(usize, f64)> {
+    pub fn smallest(&self, cone: &FrictionCone) -> Result<Option<(usize, f64)>, Error> {
         let bar = AtomicU64::new(f64::MAX.to_bits());
-        let (index, negated) = self.first(cone, |evaluator, contacts, center| {
+        let worst = self.first(cone, |evaluator, contacts, center| {
             // Not below the bar only if above it: equal ones are told apart by their index.
             let threshold = f64::from_bits(bar.load(Ordering::Relaxed)).next_up();
             let quality = evaluator.quality_below(contacts, center, threshold);
             bar.fetch_min(quality.to_bits(), Ordering::Relaxed);
             -quality
         })?;
-        Some((index, -negated))
+        Ok(worst.map(|(index, negated)| (index, -negated)))
     }
 
     /// Index and value of the grasp with the greatest value, the first among equals.
@@ -406,7 +543,8 @@ impl Batch<'_> {
         &self,
         cone: &FrictionCone,
         value: impl Fn(&mut Evaluator, &[Contact], DVec3) -> f64 + Sync,
-    ) -> Option<(usize, f64)> {
+    ) -> Result<Option<(usize, f64)>, Error> {
+        let m = self.contacts_per_grasp()?;
         let better = |a: (usize, f64), b: (usize, f64)| {
             if a.1 > b.1 || (a.1 == b.1 && a.0 < b.0) {
                 a
@@ -414,46 +552,46 @@ impl Batch<'_> {
                 b
             }
         };
+        let best_of_chunk = |worker: &mut Worker, chunk: usize| {
+            let end = self.centers.len().min((chunk + 1) * CHUNK);
+            let mut best: Option<(usize, f64)> = None;
+            for index in chunk * CHUNK..end {
+                let value = worker.on(self, index, &value)?;
+                best = Some(best.map_or((index, value), |best| better(best, (index, value))));
+            }
+            Ok(best)
+        };
         (0..self.centers.len().div_ceil(CHUNK))
             .into_par_iter()
-            .map_init(
-                || (Evaluator::new(cone), self.blank()),
-                |(evaluator, contacts), chunk| {
-                    let end = self.centers.len().min((chunk + 1) * CHUNK);
-                    (chunk * CHUNK..end)
-                        .map(|index| {
-                            let center = self.grasp(index, contacts);
-                            (index, value(evaluator, contacts, center))
-                        })
-                        .reduce(better)
+            .map_init(|| Worker::new(cone, m), best_of_chunk)
+            .try_reduce(
+                || None,
+                |a, b| {
+                    Ok(match (a, b) {
+                        (Some(a), Some(b)) => Some(better(a, b)),
+                        (a, b) => a.or(b),
+                    })
                 },
             )
-            .flatten()
-            .reduce_with(better)
     }
 
-    fn contacts_per_grasp(&self) -> usize {
-        self.points.len() / self.centers.len().max(1)
-    }
-
-    /// Grasp `index`, its contacts written over the m in `contacts`.
-    #[inline]
-    fn grasp(&self, index: usize, contacts: &mut [Contact]) -> DVec3 {
-        let own = index * contacts.len()..(index + 1) * contacts.len();
-        let pairs = self.points[own.clone()].iter().zip(&self.normals[own]);
-        for (contact, (&point, &normal)) in contacts.iter_mut().zip(pairs) {
-            contact.point = point.into();
-            contact.normal = normal.into();
+    /// m, if the parts of the batch fit each other.
+    fn contacts_per_grasp(&self) -> Result<usize, Error> {
+        let (points, grasps) = (self.points.len(), self.centers.len());
+        let m = points / grasps.max(1);
+        let fits = |length: usize| length == m * grasps;
+        if fits(points)
+            && fits(self.normals.len())
+            && (self.frictions.is_empty() || fits(self.frictions.len()))
+        {
+            return Ok(m);
         }
-        self.centers[index].into()
-    }
-
-    fn blank(&self) -> Vec<Contact> {
-        let contact = Contact {
-            point: DVec3::ZERO,
-            normal: DVec3::Z,
-        };
-        vec![contact; self.contacts_per_grasp()]
+        Err(Error::Batch {
+            points,
+            normals: self.normals.len(),
+            centers: grasps,
+            frictions: self.frictions.len(),
+        })
     }
 
     fn each<T: Send>(
@@ -462,21 +600,90 @@ impl Batch<'_> {
         out: &mut [T],
         width: usize,
         evaluate: impl Fn(&mut Evaluator, &[Contact], DVec3, &mut [T]) + Sync,
-    ) {
-        let run = |evaluator: &mut Evaluator, chunk: usize, out: &mut [T]| {
-            let mut contacts = self.blank();
+    ) -> Result<(), Error> {
+        let m = self.contacts_per_grasp()?;
+        if out.len() != self.centers.len() * width {
+            return Err(Error::Length {
+                name: "out",
+                wanted: self.centers.len() * width,
+                got: out.len(),
+            });
+        }
+        let run = |worker: &mut Worker, chunk: usize, out: &mut [T]| {
             for (offset, slot) in out.chunks_exact_mut(width).enumerate() {
-                let center = self.grasp(chunk * CHUNK + offset, &mut contacts);
-                evaluate(evaluator, &contacts, center, slot);
+                worker.on(
+                    self,
+                    chunk * CHUNK + offset,
+                    |evaluator, contacts, center| {
+                        evaluate(evaluator, contacts, center, slot);
+                    },
+                )?;
             }
+            Ok(())
         };
         if out.len() <= CHUNK * width {
-            run(&mut Evaluator::new(cone), 0, out);
+            run(&mut Worker::new(cone, m), 0, out)
         } else {
-            out.par_chunks_mut(CHUNK * width).enumerate().for_each_init(
-                || Evaluator::new(cone),
-                |evaluator, (chunk, out)| run(evaluator, chunk, out),
-            );
+            out.par_chunks_mut(CHUNK * width)
+                .enumerate()
+                .map_init(
+                    || Worker::new(cone, m),
+                    |worker, (chunk, out)| run(worker, chunk, out),
+                )
+                .collect()
+        }
+    }
+}
+
+/// Evaluates grasps of a batch one after the other.
+struct Worker {
+    evaluator: Evaluator,
+    contacts: Vec<Contact>,
+}
+
+impl Worker {
+    fn new(cone: &FrictionCone, m: usize) -> Self {
+        let contact = Contact {
+            point: DVec3::ZERO,
+            normal: DVec3::Z,
+        };
+        Self {
+            evaluator: Evaluator::new(cone),
+            contacts: vec![contact; m],
+        }
+    }
+
+    #[inline]
+    fn on<T>(
+        &mut self,
+        batch: &Batch,
+        index: usize,
+        evaluate: impl FnOnce(&mut Evaluator, &[Contact], DVec3) -> T,
+    ) -> Result<T, Error> {
+        let m = self.contacts.len();
+        let own = index * m..(index + 1) * m;
+        let pairs = batch.points[own.clone()]
+            .iter()
+            .zip(&batch.normals[own.clone()]);
+        for (contact, (&point, &normal)) in self.contacts.iter_mut().zip(pairs) {
+            contact.point = point.into();
+            contact.normal = normal.into();
+        }
+        if !batch.frictions.is_empty() {
+            self.evaluator.set_frictions(&batch.frictions[own]);
+        }
+        let value = evaluate(
+            &mut self.evaluator,
+            &self.contacts,
+            batch.centers[index].into(),
+        );
+        match self.evaluator.take_unconverged() {
+            None => Ok(value),
+            Some([lower, upper]) => Err(Error::NotConverged {
+                grasp: index,
+                lower,
+                upper,
+            }),
         }
     }
 }

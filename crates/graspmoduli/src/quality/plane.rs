@@ -46,9 +46,28 @@ pub(super) fn at<const N: usize>(table: &Table<N>, index: usize) -> [f64; N] {
     std::array::from_fn(|axis| block[axis][index % LANES])
 }
 
-/// Lengths relative to the triangle's longest side, and products of unit vectors, below which a
-/// configuration counts as degenerate (collinear, or with the origin on the hull's boundary).
-const DEGENERATE: f64 = 1e-12;
+/// Triangles flatter than this (twice the area over the longest side's square) have no plane that
+/// is known well enough.
+const FLAT: f64 = 1e-5;
+/// The least angle, in radians, that is not taken for rounding; see [`Plane::force_closure`].
+const ANGLE: f64 = 1e-10;
+/// Added to the squared sine of a cone's half angle before a normal counts as too steep.
+const STEEP: f64 = 1e-9;
+/// Edges of cones, by their components out of the plane, that may as well lie in it.
+const IN_PLANE: f64 = 1e-7;
+/// Friction for which wedges are neither all of a half-plane nor nothing to rounding.
+const USUAL_FRICTION: std::ops::RangeInclusive<f64> = 1e-4..=1e4;
+
+/// Is a grasp force closure?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Closure {
+    /// Yes, beyond rounding.
+    Yes,
+    /// No, beyond rounding.
+    No,
+    /// Too close to tell in the plane: the expanding polytope must.
+    Unclear,
+}
 
 /// One contact in the frame of the plane. Arrays over edges or rays are padded with zeros.
 #[derive(Debug, Clone, Default)]
@@ -95,23 +114,24 @@ impl Side {
 }
 
 /// Vectors (x, y, height) about e₃, padded with zeros to whole lanes.
-fn padded(vectors: &[[f64; 2]], height: f64) -> Table<3> {
-    let mut table = zeros(vectors.len());
-    for (index, [x, y]) in vectors.iter().enumerate() {
-        for (row, value) in table[index / LANES].iter_mut().zip([*x, *y, height]) {
+fn padded(vectors: impl Iterator<Item = [f64; 2]>, count: usize, height: f64) -> Table<3> {
+    let mut table = zeros(count);
+    for (index, [x, y]) in vectors.enumerate() {
+        for (row, value) in table[index / LANES].iter_mut().zip([x, y, height]) {
             row[index % LANES] = value;
         }
     }
     table
 }
 
-/// Working memory for grasps of three contacts with one kind of friction cone.
+/// Working memory for grasps of three contacts with friction cones of one number of edges.
 #[derive(Debug, Clone)]
 pub(super) struct Plane {
     pub edges: usize,
-    friction: f64,
-    edge_table: Table<3>,
-    ray_table: Table<3>,
+    frictions: [f64; 3],
+    edge_tables: [Table<3>; 3],
+    /// Of unit length.
+    ray_tables: [Table<3>; 3],
     /// Columns: the plane's axes in the object frame.
     pub basis: DMat3,
     /// Centre of mass in the frame of the plane.
@@ -120,79 +140,109 @@ pub(super) struct Plane {
     /// Unit vectors along the triangle's sides 12, 13, 23, and their lengths.
     along: [DVec2; 3],
     length: [f64; 3],
+    /// How well directions in the plane are known: units of rounding over the triangle's flatness.
+    rounding: f64,
     pub velocity: Velocity<f64>,
 }
 
 impl Plane {
     pub fn new(cone: &FrictionCone) -> Self {
-        Self {
+        let mut plane = Self {
             edges: cone.len(),
-            friction: cone.friction(),
-            edge_table: padded(&cone.edges, 1.0),
-            ray_table: padded(&cone.rays, cone.ray_height),
+            frictions: [f64::NAN; 3],
+            edge_tables: Default::default(),
+            ray_tables: Default::default(),
             basis: DMat3::IDENTITY,
             center: DVec3::ZERO,
             sides: std::array::from_fn(|_| Side::new(cone.len())),
             along: [DVec2::ZERO; 3],
             length: [0.0; 3],
+            rounding: 0.0,
             velocity: Velocity::default(),
+        };
+        plane.set_frictions(cone, [cone.friction(0); 3]);
+        plane
+    }
+
+    /// Gives each contact its coefficient of friction.
+    #[inline]
+    pub fn set_frictions(&mut self, cone: &FrictionCone, frictions: [f64; 3]) {
+        for (i, friction) in frictions.into_iter().enumerate() {
+            if friction == self.frictions[i] {
+                continue;
+            }
+            let edges = cone.edges.iter().map(|[x, y]| [friction * x, friction * y]);
+            self.edge_tables[i] = padded(edges, cone.len(), 1.0);
+            let height = -friction * cone.inner;
+            let length = height.hypot(1.0);
+            let rays = cone.rays.iter().map(|[x, y]| [x / length, y / length]);
+            self.ray_tables[i] = padded(rays, cone.len(), height / length);
+        }
+        self.frictions = frictions;
+    }
+
+    /// Is the grasp force closure? Sets up the plane of the contacts and their cones' edges in it,
+    /// which is left undefined if the answer is no.
+    #[inline(always)]
+    pub fn closure(&mut self, contacts: &[Contact; 3]) -> Closure {
+        match self.set_up(contacts) {
+            Closure::Yes => self.force_closure(),
+            other => other,
         }
     }
 
-    /// Sets up the plane of the contacts and their cones' edges in it.
-    ///
-    /// Returns false, and leaves the rest undefined, where the contacts are collinear to
-    /// rounding or some cone does not reach to both sides of the plane: then the grasp is not
-    /// force closure.
+    /// `Yes` if there is a plane and each cone may reach to both of its sides.
     #[inline(always)]
-    pub fn set_up(&mut self, contacts: &[Contact; 3]) -> bool {
+    fn set_up(&mut self, contacts: &[Contact; 3]) -> Closure {
         let origin = contacts[0].point;
         let (first, second) = (contacts[1].point - origin, contacts[2].point - origin);
+        let third = second - first;
         let normal = first.cross(second);
-        // The circular cone reaches to both sides of the plane where |n·z| < μ √(1 − (n·z)²); the
-        // polygonal one lies within it. Half of all grasps end here, before any division; where
-        // this overflows, the same test below decides.
-        let steepest = self.friction / (1.0 + self.friction * self.friction).sqrt();
-        let bar = steepest * steepest * normal.length_squared() * (1.0 + DEGENERATE);
-        let rises = [0, 1, 2].map(|i| contacts[i].normal.dot(normal));
-        if rises
-            .into_iter()
-            .fold(false, |steep, rise| steep | (rise * rise > bar))
-        {
-            return false;
-        }
         let longest = first
             .length_squared()
             .max(second.length_squared())
-            .max((second - first).length_squared());
-        let area = normal.length();
-        // Negated, so that overflow to NaN counts as degenerate too.
-        if !(area > DEGENERATE * longest && longest.is_finite()) {
-            return false;
+            .max(third.length_squared());
+        let square = normal.length_squared();
+        // Negated, so that NaN from overflow is unclear too, and so is what underflows.
+        if !(square >= FLAT * FLAT * longest * longest && longest > 1e-60 && longest < 1e60) {
+            return Closure::Unclear;
         }
+        // The circular cone reaches to both sides of the plane where |n·z| < μ/√(1 + μ²); the
+        // polygonal one lies within it. Half of all grasps end here, before any division.
+        let mut steep = false;
+        for (contact, friction) in contacts.iter().zip(self.frictions) {
+            let rise = contact.normal.dot(normal);
+            let bar = friction * friction / (1.0 + friction * friction) + STEEP;
+            steep |= rise * rise > bar * square;
+        }
+        if steep {
+            return Closure::No;
+        }
+        let area = square.sqrt();
+        self.rounding = 4.0 * f64::EPSILON * longest / area;
         let z = normal / area;
-        if contacts.iter().any(|c| c.normal.dot(z).abs() >= steepest) {
-            return false;
-        }
         let x = first.normalize();
         let y = z.cross(x);
         self.basis = DMat3::from_cols(x, y, z);
         let planar = |v: DVec3| DVec2::new(v.dot(x), v.dot(y));
         let points = [DVec2::ZERO, planar(first), planar(second)];
-        for (side, (contact, point)) in self.sides.iter_mut().zip(contacts.iter().zip(points)) {
+        for (i, (contact, point)) in contacts.iter().zip(points).enumerate() {
             let frame = Frame::new(contact.normal);
             let local = |v: DVec3| DVec3::new(v.dot(x), v.dot(y), v.dot(z));
+            let side = &mut self.sides[i];
             side.point = point;
             side.normal = local(frame.normal);
             side.tangents = frame.tangents.map(local);
-            side.turn(&self.edge_table, false);
+            side.turn(&self.edge_tables[i], false);
         }
-        for (row, (from, to)) in [(0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
-            let side = self.sides[to].point - self.sides[from].point;
+        for (row, side) in [points[1], points[2], planar(third)]
+            .into_iter()
+            .enumerate()
+        {
             self.length[row] = side.length();
             self.along[row] = side / self.length[row];
         }
-        true
+        Closure::Yes
     }
 
     /// Sets up what the kernel needs beyond the planar test.
@@ -202,8 +252,8 @@ impl Plane {
             .basis
             .transpose()
             .mul_vec3(center_of_mass - contacts[0].point);
-        for side in &mut self.sides {
-            side.turn(&self.ray_table, true);
+        for (side, table) in self.sides.iter_mut().zip(&self.ray_tables) {
+            side.turn(table, true);
         }
         self.velocity = Velocity::new(self);
     }
@@ -218,6 +268,13 @@ impl Plane {
     #[inline(always)]
     pub fn length(&self) -> [f64; 3] {
         self.length
+    }
+
+    /// The least height of the triangle, which is less than any of its sides.
+    #[inline(always)]
+    pub fn narrowest(&self) -> f64 {
+        let [first, second, third] = self.length;
+        self.length[0] * self.sides[2].point.y / first.max(second).max(third)
     }
 
     /// The unit vector from one contact to another, and their distance.
@@ -235,19 +292,46 @@ impl Plane {
     /// the plane bounds one ratio per contact, |t₁₃/t₁₂|, |t₁₂/t₂₃| and |t₂₃/t₁₃|. Their product
     /// is 1, and nothing else ties them: a strict solution exists exactly when, for some signs,
     /// the product of the lower bounds is below 1 and that of the upper bounds above.
+    ///
+    /// The answer is no if wedges opened by more than the rounding error of their sides have no
+    /// solution, yes if wedges closed by as much have one, and else unclear: all signs that are
+    /// taken on the way are then right, or do not matter.
     #[inline(always)]
-    pub fn force_closure(&self) -> bool {
+    fn force_closure(&self) -> Closure {
+        if self.frictions.iter().any(|mu| !USUAL_FRICTION.contains(mu)) {
+            return Closure::Unclear;
+        }
+        let mut wedges = [Wedge::default(); 3];
+        for (contact, wedge) in wedges.iter_mut().enumerate() {
+            match self.wedge(contact) {
+                Ok(found) => *wedge = found,
+                Err(closure) => return closure,
+            }
+        }
+        if !self.balances(&wedges.map(|wedge| wedge.opened(1.0))) {
+            return Closure::No;
+        }
+        let closed = wedges.map(|wedge| wedge.opened(-1.0));
+        let proper = closed.iter().all(|[a, b]| a.perp_dot(*b) > 0.0);
+        if proper && self.balances(&closed) {
+            Closure::Yes
+        } else {
+            Closure::Unclear
+        }
+    }
+
+    /// Are there strict equilibria with forces in these wedges, each given by its sides
+    /// counterclockwise?
+    #[inline(always)]
+    fn balances(&self, wedges: &[[DVec2; 2]; 3]) -> bool {
         let [e12, e13, e23] = self.along;
         // Coordinates of a force at each contact: (t12, t13), (t23, t12), (t13, t23).
         let coordinates = [[e13, -e12], [-e12, -e23], [-e23, e13]];
         // The rays of the wedges, mirrored into the first quadrant from each of the four.
         let mut rays = [[0.0; 12]; 4];
         for contact in 0..3 {
-            let Some(wedge) = self.wedge(contact) else {
-                return false;
-            };
             let [p, q] = coordinates[contact];
-            let [a, b] = wedge.map(|f| DVec2::new(f.perp_dot(p), f.perp_dot(q)));
+            let [a, b] = wedges[contact].map(|f| DVec2::new(f.perp_dot(p), f.perp_dot(q)));
             // Mirroring once turns counterclockwise into clockwise: the rays swap places.
             let mirrored = [
                 [a.x, -b.x, b.x, -a.x],
@@ -273,37 +357,47 @@ impl Plane {
         let [low_x, low_y, high_x, high_y] = products;
         let mut closed = 0u32;
         for octant in 0..8 {
-            let below = low_y[octant] < low_x[octant] * (1.0 - DEGENERATE);
-            let above = high_y[octant] * (1.0 - DEGENERATE) > high_x[octant];
+            let (below, above) = (
+                low_y[octant] < low_x[octant],
+                high_y[octant] > high_x[octant],
+            );
             closed |= u32::from(below & above);
         }
         closed != 0
     }
 
-    /// The two directions, of any length, in which the boundary of a cone crosses the plane,
-    /// counterclockwise.
+    /// Where the boundary of a cone crosses the plane; or the answer, where it may not.
     #[inline(always)]
-    fn wedge(&self, contact: usize) -> Option<[DVec2; 2]> {
+    fn wedge(&self, contact: usize) -> Result<Wedge, Closure> {
         let table = &self.sides[contact].edge;
+        let size = 1.0 + self.frictions[contact];
+        let bar = IN_PLANE * size;
+        let sure = ANGLE.max(self.rounding) * size;
         let last = self.edges - 1;
         let mut below = u32::from(at(table, last)[2] < 0.0);
         // Where the boundary comes up through the plane, and where it goes down.
         let (mut ups, mut downs) = (0, 0);
         let (mut up_to, mut down_to) = (0, 0);
         let (mut above_somewhere, mut below_somewhere) = (0, 0);
+        let (mut not_under, mut not_over) = (0, 0);
         for (block, [_, _, row]) in table.iter().enumerate() {
             let (mut negative, mut high, mut low) = (0u32, 0u32, 0u32);
+            let (mut over, mut under) = (0u32, 0u32);
             for lane in 0..LANES {
                 negative |= u32::from(row[lane] < 0.0) << lane;
-                high |= u32::from(row[lane] > DEGENERATE) << lane;
-                low |= u32::from(row[lane] < -DEGENERATE) << lane;
+                high |= u32::from(row[lane] > bar) << lane;
+                low |= u32::from(row[lane] < -bar) << lane;
+                over |= u32::from(row[lane] > -sure) << lane;
+                under |= u32::from(row[lane] < sure) << lane;
             }
-            // The padding's zeros are neither.
+            let count = LANES.min(self.edges - block * LANES);
+            let valid = (1 << count) - 1;
+            // The padding's zeros are neither high nor low.
             above_somewhere |= high;
             below_somewhere |= low;
-            let count = LANES.min(self.edges - block * LANES);
+            not_under |= over & valid;
+            not_over |= under & valid;
             let before = negative << 1 | below;
-            let valid = (1 << count) - 1;
             let (up, down) = (before & !negative & valid, !before & negative & valid);
             ups += up.count_ones();
             downs += down.count_ones();
@@ -316,15 +410,55 @@ impl Plane {
             below = negative >> (count - 1);
         }
         if (ups != 1) | (downs != 1) | (above_somewhere == 0) | (below_somewhere == 0) {
-            return None;
+            return Err(if (not_under == 0) | (not_over == 0) {
+                Closure::No
+            } else {
+                Closure::Unclear
+            });
         }
         let crossing = |to: usize| {
             let from = if to == 0 { last } else { to - 1 };
             let ([x0, y0, z0], [x1, y1, z1]) = (at(table, from), at(table, to));
-            DVec2::new(x0, y0) * z1.abs() + DVec2::new(x1, y1) * z0.abs()
+            let side = DVec2::new(x0, y0) * z1.abs() + DVec2::new(x1, y1) * z0.abs();
+            // Errors of the heights turn the crossing, the more the flatter the face.
+            let angle = self.rounding * (1.0 + size * size / (z0.abs() + z1.abs()));
+            (side, ANGLE + angle)
         };
-        let (a, b) = (crossing(up_to), crossing(down_to));
-        Some(if a.perp_dot(b) < 0.0 { [b, a] } else { [a, b] })
+        let ([a, b], [to_a, to_b]) = {
+            let (up, down) = (crossing(up_to), crossing(down_to));
+            ([up.0, down.0], [up.1, down.1])
+        };
+        Ok(if a.perp_dot(b) < 0.0 {
+            Wedge {
+                sides: [b, a],
+                angles: [to_b, to_a],
+            }
+        } else {
+            Wedge {
+                sides: [a, b],
+                angles: [to_a, to_b],
+            }
+        })
+    }
+}
+
+/// The forces of a cone in the plane: between two directions, of any length, counterclockwise.
+#[derive(Debug, Clone, Copy, Default)]
+struct Wedge {
+    sides: [DVec2; 2],
+    /// Errors of the directions, in radians.
+    angles: [f64; 2],
+}
+
+impl Wedge {
+    /// The sides turned outward by so many times their errors.
+    #[inline(always)]
+    fn opened(self, times: f64) -> [DVec2; 2] {
+        let [a, b] = self.sides;
+        [
+            a - a.perp() * (times * self.angles[0]),
+            b + b.perp() * (times * self.angles[1]),
+        ]
     }
 }
 

@@ -7,14 +7,15 @@
 //! a cone of new ones from it: each goes through a ridge between a facet f that sees the point and
 //! a g that does not, so x is the convex combination of x_f and x_g with ⟨x, p⟩ = 1, and nothing is
 //! solved. At any time 1/‖x‖ of the nearest facet bounds the answer from below, and h(x)/‖x‖, h
-//! the support function, from above.
+//! the support function, from above. The first polytope is the simplex that [`surround`] finds.
 //!
 //! Points in one plane, such as the edges of a cone, would give facets of more than six points.
 //! So a point p counts as p/(1 + ε_p) with fixed tiny different ε_p, which moves the answer inward
-//! by less than that; the value reported is that of the points as they are.
+//! by less than that; the value reported is that of the points as they are. Where a sign cannot
+//! be told from rounding all the same, the expansion begins anew with other, larger ε_p.
 
-use super::Twist;
-use super::gradient::solve;
+use super::r6::{Twist, dot, solve};
+use super::surround::{BOUNDARY, Position, Simplex, surround};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -22,19 +23,43 @@ use std::collections::BinaryHeap;
 pub(super) trait Support {
     /// A point of the hull with the greatest ⟨x, p⟩, and a number that identifies it.
     fn farthest(&self, x: &Twist) -> (Twist, u64);
+    /// A point in the interior of the hull, relative to its dimension, in general position; other
+    /// levels give another.
+    fn inside(&self, levels: Levels) -> Twist;
 }
 
-/// Circumradii of the simplex about the origin that is the first inner polytope, tried one after
-/// the other, and the perturbations that go with them: from a large one facets are accurate, a
-/// small one fits into small hulls.
-const SEEDS: [(f64, f64); 3] = [(1e-2, 1e-11), (1e-5, 1e-9), (1e-9, 1e-5)];
+/// The levels 1 + ε_p at which points count.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Levels {
+    epsilon: f64,
+    /// Tells one attempt's levels from another's.
+    salt: u64,
+}
+
+impl Levels {
+    /// The level of the point with this key.
+    #[inline]
+    pub fn of(self, key: u64) -> f64 {
+        1.0 + self.epsilon * self.spread(key)
+    }
+
+    /// Numbers in [0.5, 1] that no relation among the points knows of.
+    #[inline]
+    pub fn spread(self, key: u64) -> f64 {
+        0.5 + 0.5 * (mix(key ^ self.salt) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// The perturbations ε that are tried, one after the other.
+const EPSILONS: [f64; 9] = [1e-9, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
+/// The largest error of a value, in units of forces and of torques over the longest lever arm,
+/// that a perturbation may bring with it; a value with a larger one has not converged.
+pub(crate) const LARGEST_ERROR: f64 = 1e-8;
 /// Slots of the table of ridges: free, and met twice.
 const EMPTY: u32 = u32::MAX;
 const JOINED: u32 = u32::MAX - 1;
-const SEED_POINTS: u32 = 7;
-/// A hull that reaches less far than this beyond a plane through the origin does not contain it in
-/// its interior, to rounding.
-const DEGENERATE: f64 = 1e-12;
+/// A height over a facet, relative to ‖x‖, that rounding may have made.
+const ROUNDING: f64 = 1e-14;
 /// Facets created before the search ends with the bounds that it has.
 const MOST_FACETS: usize = 1 << 22;
 
@@ -47,19 +72,75 @@ pub(super) struct Distance {
     pub upper: f64,
     /// v.
     pub direction: Twist,
+    /// Is `upper` the distance, but for rounding? Or else, did the caller have enough?
+    pub converged: bool,
 }
 
 impl Distance {
-    /// Of a hull that is known not to have the origin in its interior.
-    pub const ZERO: Self = Self::zero([0.0; 6]);
-
     /// The origin is not in the interior of the hull, which lies behind the plane with this normal.
-    const fn zero(direction: Twist) -> Self {
+    pub const fn zero(direction: Twist) -> Self {
         Self {
             lower: 0.0,
             upper: 0.0,
             direction,
+            converged: true,
         }
+    }
+
+    /// Nothing is known but that the distance is at least 0.
+    const UNKNOWN: Self = Self {
+        lower: 0.0,
+        upper: f64::INFINITY,
+        direction: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        converged: false,
+    };
+
+    /// Takes the direction x, in which the hull reaches up to ⟨x, ·⟩ = height.
+    fn take(&mut self, height: f64, x: &Twist, metric: Metric) {
+        let length = metric.length(x);
+        if height / length < self.upper {
+            self.upper = height / length;
+            self.direction = x.map(|c| c / length);
+        }
+    }
+}
+
+/// Lengths of twists whose last three coordinates were multiplied by the scale by which wrenches'
+/// were divided: ‖x‖² = ‖v‖² + ‖ω‖²/scale².
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Metric {
+    linear: f64,
+    angular: f64,
+    /// What the square root of the two is divided by, so that neither overflows.
+    unit: f64,
+}
+
+impl Metric {
+    pub fn new(scale: f64) -> Self {
+        if scale >= 1.0 {
+            Self {
+                linear: 1.0,
+                angular: (1.0 / scale) / scale,
+                unit: 1.0,
+            }
+        } else {
+            Self {
+                linear: scale * scale,
+                angular: 1.0,
+                unit: scale,
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn square(self, x: &Twist) -> f64 {
+        self.linear * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+            + self.angular * (x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+    }
+
+    #[inline(always)]
+    fn length(self, x: &Twist) -> f64 {
+        self.square(x).sqrt() / self.unit
     }
 }
 
@@ -74,10 +155,8 @@ struct Facet {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
-    /// Has a point of the simplex that the expansion started from. While there are such facets the
-    /// origin may be outside of the hull itself, so they come first.
-    of_seed: bool,
-    norm_squared: f64,
+    /// ‖x‖² but for the metric's unit.
+    square: f64,
     facet: u32,
 }
 
@@ -85,9 +164,8 @@ impl Eq for Entry {}
 
 impl Ord for Entry {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.of_seed
-            .cmp(&other.of_seed)
-            .then(self.norm_squared.total_cmp(&other.norm_squared))
+        self.square
+            .total_cmp(&other.square)
             .then(other.facet.cmp(&self.facet))
     }
 }
@@ -113,63 +191,54 @@ pub(super) struct Polytope {
     ridges: Vec<(u64, u32)>,
 }
 
-/// Why an expansion ended without an answer.
-enum Failure {
-    /// The simplex that it started from reaches out of the hull.
-    TooSmall(Twist),
-    /// Rounding made the facets contradict each other.
-    Rounding,
-}
+/// Rounding made the facets contradict each other, or a sign could not be told.
+struct Rounding;
 
 impl Polytope {
     /// The distance from the origin to the boundary of a hull, by the metric that counts the last
     /// three coordinates `scale` times (the hull should be about as long in these as in the first
     /// three). `enough(lower, upper)` may end the search early.
     ///
-    /// The distance is 0 where the origin is not in the interior, or by less than 1e-9.
+    /// The distance is 0 where the origin is not in the interior, or only by [`BOUNDARY`].
     pub fn distance(
         &mut self,
         support: &impl Support,
         scale: f64,
         mut enough: impl FnMut(f64, f64) -> bool,
     ) -> Distance {
-        if let Some(x) = separating(support) {
-            return Distance::zero(x);
-        }
-        let mut outside = [0.0; 6];
-        for (seed, perturbation) in SEEDS {
-            // A failure by rounding is cured by other, larger perturbations.
-            for attempt in 0..4 {
-                let epsilon = perturbation * 10f64.powi(attempt);
-                match self.expand(support, scale, seed, epsilon, &mut enough) {
-                    Ok(distance) => return distance,
-                    Err(Failure::TooSmall(x)) => {
-                        outside = x;
-                        break;
-                    }
-                    Err(Failure::Rounding) => {}
-                }
+        let metric = Metric::new(scale);
+        let mut best = Distance::UNKNOWN;
+        for (attempt, epsilon) in (0..).zip(EPSILONS) {
+            let levels = Levels {
+                epsilon,
+                salt: attempt << 48,
+            };
+            let simplex = match surround(support, levels) {
+                Some(Position::Separated(x)) => return Distance::zero(x),
+                Some(Position::Surrounded(simplex)) => simplex,
+                None => continue,
+            };
+            let expanded = self.expand(support, simplex, metric, levels, &mut best, &mut enough);
+            if expanded.is_ok() {
+                return best;
             }
         }
-        Distance::zero(outside)
+        best.lower = best.lower.min(best.upper);
+        best
     }
 
+    /// Narrows the bounds until they meet, or are enough for the caller, or too many facets.
     fn expand(
         &mut self,
         support: &impl Support,
-        scale: f64,
-        seed: f64,
-        epsilon: f64,
+        simplex: Simplex,
+        metric: Metric,
+        levels: Levels,
+        best: &mut Distance,
         enough: &mut impl FnMut(f64, f64) -> bool,
-    ) -> Result<Distance, Failure> {
-        // A twist's last coordinates were multiplied by the scale by which wrenches' were divided.
-        let metric = 1.0 / (scale * scale);
-        self.start(seed, metric);
-        let mut best = Distance {
-            lower: 0.0,
-            upper: f64::INFINITY,
-            direction: [0.0; 6],
-        };
+    ) -> Result<(), Rounding> {
+        self.start(simplex, metric);
+        let epsilon = levels.epsilon;
         let mut made = 0;
         while let Some(entry) = self.queue.pop() {
             let facet = self.facets[entry.facet as usize];
@@ -177,63 +246,53 @@ impl Polytope {
                 continue;
             }
             let x = facet.x;
-            let length = entry.norm_squared.sqrt();
-            if !entry.of_seed {
-                best.lower = 1.0 / length;
-            }
+            let real = dot(&x, &x).sqrt();
+            best.lower = best.lower.max(1.0 / metric.length(&x)).min(best.upper);
             let (point, key) = support.farthest(&x);
             let height = dot(&x, &point);
-            let real = dot(&x, &x).sqrt();
-            if height <= DEGENERATE * real {
-                return Ok(Distance::zero(x.map(|c| c / real)));
+            if height <= BOUNDARY * real {
+                *best = Distance::zero(x.map(|c| c / real));
+                return Ok(());
             }
             best.take(height, &x, metric);
-            let level = 1.0 + epsilon * spread(key);
-            if height - level <= 0.01 * epsilon {
-                if entry.of_seed {
-                    return Err(Failure::TooSmall(x.map(|c| c / real)));
+            let level = levels.of(key);
+            if height - level <= (ROUNDING * real).max(0.01 * epsilon) {
+                // What the perturbation may have hidden.
+                if epsilon / real > LARGEST_ERROR {
+                    return Err(Rounding);
                 }
-                self.polish(support, entry, epsilon, metric, &mut best);
-                return Ok(best);
+                self.polish(support, entry, epsilon, metric, best);
+                best.converged = true;
+                return Ok(());
             }
-            if enough(best.lower, best.upper) || made > MOST_FACETS {
-                return Ok(best);
+            best.converged = enough(best.lower, best.upper);
+            if best.converged || made > MOST_FACETS {
+                return Ok(());
             }
             made += self.insert(entry.facet, point, level, metric)?;
         }
-        Err(Failure::Rounding)
+        Err(Rounding)
     }
 
-    /// A regular simplex of circumradius `seed`.
-    fn start(&mut self, seed: f64, metric: f64) {
+    /// The facets of a simplex about the origin: facet k lies opposite to point k, so it is also
+    /// the neighbour across from it.
+    fn start(&mut self, simplex: Simplex, metric: Metric) {
         self.points.clear();
+        self.points.extend(simplex.points);
+        self.hashes.clear();
+        self.hashes.extend((0..7).map(mix));
         self.facets.clear();
         self.queue.clear();
-        let n = 6.0_f64;
-        let diagonal = (1.0 + 1.0 / n).sqrt();
-        let shift = ((n + 1.0).sqrt() + 1.0) / (n * n.sqrt());
-        for i in 0..6 {
-            let mut point = [-seed * shift; 6];
-            point[i] += seed * diagonal;
-            self.points.push(point);
-        }
-        self.points.push([seed / n.sqrt(); 6]);
-        self.hashes.clear();
-        self.hashes.extend((0..SEED_POINTS).map(|p| mix(p.into())));
-        for opposite in 0..SEED_POINTS {
-            let x = self.points[opposite as usize].map(|c| -n * c / (seed * seed));
-            // Facet k lies opposite to point k, so it is also the neighbour across from it.
+        for (opposite, x) in (0..).zip(simplex.facets) {
             let others = std::array::from_fn(|k| k as u32 + u32::from(k as u32 >= opposite));
-            let facet = Facet {
+            self.facets.push(Facet {
                 x,
                 points: others,
                 neighbors: others,
                 alive: true,
-            };
-            self.facets.push(facet);
+            });
             self.queue.push(Entry {
-                of_seed: true,
-                norm_squared: norm_squared(&x, metric),
+                square: metric.square(&x),
                 facet: opposite,
             });
         }
@@ -245,8 +304,8 @@ impl Polytope {
         seen: u32,
         point: Twist,
         level: f64,
-        metric: f64,
-    ) -> Result<usize, Failure> {
+        metric: Metric,
+    ) -> Result<usize, Rounding> {
         let new_point = self.points.len() as u32;
         self.points.push(point);
         self.hashes.push(mix(new_point.into()));
@@ -266,12 +325,14 @@ impl Polytope {
                     continue;
                 }
                 let under = dot(&other.x, &point) - level;
+                if under.abs() <= ROUNDING * dot(&other.x, &other.x).sqrt() {
+                    return Err(Rounding);
+                }
                 if under > 0.0 {
                     other.alive = false;
                     self.visible.push(neighbor);
                     continue;
                 }
-                // over > 0 ≥ under, by more than rounding for all but unlucky perturbations.
                 let share = over / (over - under);
                 let x: Twist =
                     std::array::from_fn(|i| facet.x[i] + share * (other.x[i] - facet.x[i]));
@@ -280,7 +341,7 @@ impl Polytope {
                 let mut neighbors = [u32::MAX; 6];
                 neighbors[side] = neighbor;
                 let Some(back) = other.neighbors.iter().position(|&n| n == index) else {
-                    return Err(Failure::Rounding);
+                    return Err(Rounding);
                 };
                 let created = self.facets.len() as u32;
                 self.facets[neighbor as usize].neighbors[back] = created;
@@ -292,8 +353,7 @@ impl Polytope {
                 });
                 self.created.push(created);
                 self.queue.push(Entry {
-                    of_seed: points.iter().any(|&p| p < SEED_POINTS),
-                    norm_squared: norm_squared(&x, metric),
+                    square: metric.square(&x),
                     facet: created,
                 });
             }
@@ -304,7 +364,7 @@ impl Polytope {
 
     /// Makes neighbours of the created facets that share four points and the new one: each ridge
     /// is met twice.
-    fn join(&mut self, new_point: u32) -> Result<(), Failure> {
+    fn join(&mut self, new_point: u32) -> Result<(), Rounding> {
         let size = (8 * self.created.len()).next_power_of_two();
         self.ridges.clear();
         self.ridges.resize(size, (0, EMPTY));
@@ -331,7 +391,7 @@ impl Polytope {
                 }
                 let (first, other) = (met / 8, met % 8);
                 if met == JOINED {
-                    return Err(Failure::Rounding);
+                    return Err(Rounding);
                 }
                 self.facets[first as usize].neighbors[other as usize] = created;
                 self.facets[created as usize].neighbors[side] = first;
@@ -339,11 +399,7 @@ impl Polytope {
                 open -= 1;
             }
         }
-        if open == 0 {
-            Ok(())
-        } else {
-            Err(Failure::Rounding)
-        }
+        if open == 0 { Ok(()) } else { Err(Rounding) }
     }
 
     /// The best of the facets that may be nearest but for the perturbation, by the planes through
@@ -353,14 +409,14 @@ impl Polytope {
         support: &impl Support,
         nearest: Entry,
         epsilon: f64,
-        metric: f64,
+        metric: Metric,
         best: &mut Distance,
     ) {
         const MOST: usize = 64;
-        let bar = nearest.norm_squared * (1.0 - 8.0 * epsilon);
+        let bar = nearest.square * (1.0 - 8.0 * epsilon);
         let mut entry = Some(nearest);
         let mut looked_at = 0;
-        while let Some(candidate) = entry.filter(|e| e.norm_squared >= bar && looked_at < MOST) {
+        while let Some(candidate) = entry.filter(|e| e.square >= bar && looked_at < MOST) {
             let facet = self.facets[candidate.facet as usize];
             if facet.alive {
                 looked_at += 1;
@@ -376,63 +432,10 @@ impl Polytope {
     }
 }
 
-impl Distance {
-    /// Takes the direction x, in which the hull reaches up to ⟨x, ·⟩ = height.
-    fn take(&mut self, height: f64, x: &Twist, metric: f64) {
-        let length = norm_squared(x, metric).sqrt();
-        if height / length < self.upper {
-            self.upper = height / length;
-            self.direction = x.map(|c| c / length);
-        }
-    }
-}
-
-/// A direction in which the hull does not even reach the origin, if a few steps of Gilbert's
-/// algorithm find one: the point p of the hull nearest to the origin is approached along segments
-/// to its farthest points towards the origin.
-fn separating(support: &impl Support) -> Option<Twist> {
-    const STEPS: usize = 48;
-    let (mut p, _) = support.farthest(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    for _ in 0..STEPS {
-        let length = dot(&p, &p).sqrt();
-        let back = p.map(|c| -c / length);
-        let (s, _) = support.farthest(&back);
-        let height = dot(&back, &s);
-        // A hull through the origin gives 0/0.
-        if height.is_nan() {
-            return None;
-        }
-        if height < -DEGENERATE {
-            return Some(back);
-        }
-        let way: Twist = std::array::from_fn(|i| s[i] - p[i]);
-        let share = -dot(&p, &way) / dot(&way, &way);
-        p = std::array::from_fn(|i| p[i] + share.clamp(0.0, 1.0) * way[i]);
-    }
-    None
-}
-
-/// Numbers in [0.5, 1] that no relation among the points knows of.
-fn spread(key: u64) -> f64 {
-    0.5 + 0.5 * (mix(key) >> 11) as f64 / (1u64 << 53) as f64
-}
-
 /// The finaliser of SplitMix64.
 fn mix(key: u64) -> u64 {
     let mut z = key.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
-}
-
-/// Without the fused operations of the closed form, which cost a call where they are not native.
-#[inline(always)]
-pub(super) fn dot(a: &Twist, b: &Twist) -> f64 {
-    ((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])) + (a[4] * b[4] + a[5] * b[5])
-}
-
-#[inline(always)]
-fn norm_squared(x: &Twist, metric: f64) -> f64 {
-    let linear = x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
-    linear + metric * (x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
 }

@@ -10,18 +10,24 @@
 //!
 //! The loops below only propose twists; [`Kernel::offer`] divides each by its support h(x) = max
 //! ⟨x, w_ij⟩, which puts it on the boundary of P whatever rounding did. So every value found is
-//! an upper bound of Q_l, and degenerate candidates (0/0) can do no harm.
+//! an upper bound of Q_l, and degenerate candidates (0/0) can do no harm. What could do harm are
+//! wrong signs: of force closure, which are told from rounding ([`Plane::closure`]), and of
+//! multipliers, where the triangle of contacts is flat or far from the centre of mass. Whatever is
+//! not clear beyond rounding is left to the expanding polytope.
 
-use super::Twist;
 use super::apex_ray_face::Bounds;
 use super::lanes::dot;
-use super::plane::{LANES, Lanes, Plane, Table, at, zeros};
+use super::plane::{Closure, LANES, Lanes, Plane, Table, at, zeros};
+use super::r6::Twist;
 use super::ray_ray_ray::Forms;
 use crate::contact::{Contact, FrictionCone};
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::ControlFlow;
 
+/// Lever arms that are longer than this many times the shortest side or height of the triangle of
+/// contacts: the polytope errs less.
+const LONG_LEVERS: f64 = 1e3;
 /// Multipliers above minus this count as not negative: they are products of unit vectors.
 pub(super) const SLACK: f64 = 1e-13;
 /// Added to the squared determinant of a system: candidates with a determinant below 1e-14 are
@@ -57,12 +63,24 @@ pub(crate) struct Vertex {
     pub active: Active,
 }
 
+impl Vertex {
+    /// Distance of its facet from the origin.
+    #[inline]
+    pub fn quality(&self) -> f64 {
+        1.0 / self.norm_squared.sqrt()
+    }
+}
+
+/// The closed form cannot tell beyond rounding: the expanding polytope must.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Unclear;
+
 /// What to look for in P.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Question {
     /// The longest twist.
     Longest,
-    /// The longest, or any one longer than this (by its square).
+    /// The longest, or any one that shows Q to be below this.
     LongestUpTo(f64),
     /// The longest that is longer than this (by its square).
     LongerThan(f64),
@@ -108,11 +126,21 @@ impl Kernel {
         }
     }
 
+    /// Gives each contact its coefficient of friction.
+    #[inline]
+    pub fn set_frictions(&mut self, cone: &FrictionCone, frictions: [f64; 3]) {
+        self.plane.set_frictions(cone, frictions);
+    }
+
     /// The longest admissible twist, or `None` where the grasp is not force closure (Q = 0).
     #[inline]
-    pub fn longest(&mut self, contacts: &[Contact; 3], center: DVec3) -> Option<Vertex> {
-        self.ask(contacts, center, Question::Longest)
-            .then(|| self.found[0])
+    pub fn longest(
+        &mut self,
+        contacts: &[Contact; 3],
+        center: DVec3,
+    ) -> Result<Option<Vertex>, Unclear> {
+        let closed = self.ask(contacts, center, Question::Longest)?;
+        Ok(closed.then(|| self.found[0]))
     }
 
     /// As [`Kernel::longest`], but content with any twist longer than 1/`threshold`: one such is
@@ -123,13 +151,12 @@ impl Kernel {
         contacts: &[Contact; 3],
         center: DVec3,
         threshold: f64,
-    ) -> Option<Vertex> {
-        let limit = 1.0 / (threshold * threshold);
-        self.ask(contacts, center, Question::LongestUpTo(limit))
-            .then(|| self.found[0])
+    ) -> Result<Option<Vertex>, Unclear> {
+        let closed = self.ask(contacts, center, Question::LongestUpTo(threshold))?;
+        Ok(closed.then(|| self.found[0]))
     }
 
-    /// The longest twist if it is longer than 1/`threshold`: Q < `threshold`; `Some(None)` if Q is
+    /// The longest twist if it is longer than 1/`threshold`, or about as long: `Some(None)` if Q is
     /// not below the threshold, `None` where the grasp is not force closure.
     #[inline]
     pub fn longest_above(
@@ -137,10 +164,11 @@ impl Kernel {
         contacts: &[Contact; 3],
         center: DVec3,
         threshold: f64,
-    ) -> Option<Option<Vertex>> {
-        let limit = 1.0 / (threshold * threshold);
-        self.ask(contacts, center, Question::LongerThan(limit))
-            .then(|| self.found.first().copied())
+    ) -> Result<Option<Option<Vertex>>, Unclear> {
+        // A little less, so that rounding in the square does not decide what Q should.
+        let limit = (1.0 - 1e-14) / (threshold * threshold);
+        let closed = self.ask(contacts, center, Question::LongerThan(limit))?;
+        Ok(closed.then(|| self.found.first().copied()))
     }
 
     /// Vertices of P that belong to the facets of the hull within `distance` of the origin, at
@@ -152,15 +180,19 @@ impl Kernel {
         center: DVec3,
         distance: f64,
         most: usize,
-    ) -> Option<&[Vertex]> {
+    ) -> Result<Option<&[Vertex]>, Unclear> {
         let limit = 1.0 / (distance * distance);
-        self.ask(contacts, center, Question::All(limit, most));
+        // Nothing within the distance is unclear only to this question.
+        let closed = self.ask(contacts, center, Question::All(limit, most));
+        if matches!(closed, Ok(false)) {
+            return Ok(None);
+        }
         self.found.retain(|vertex| vertex.exact);
-        if self.found.is_empty() && !self.ask(contacts, center, Question::Longest) {
-            return None;
+        if self.found.is_empty() && !self.ask(contacts, center, Question::Longest)? {
+            return Ok(None);
         }
         self.sort_found(most);
-        Some(&self.found)
+        Ok(Some(&self.found))
     }
 
     /// Longest first, the `most` longest.
@@ -172,16 +204,36 @@ impl Kernel {
 
     /// Fills `found`; false where the grasp is not force closure.
     #[inline]
-    fn ask(&mut self, contacts: &[Contact; 3], center: DVec3, question: Question) -> bool {
+    fn ask(
+        &mut self,
+        contacts: &[Contact; 3],
+        center: DVec3,
+        question: Question,
+    ) -> Result<bool, Unclear> {
         self.found.clear();
         let plane = &mut self.plane;
-        self.narrow.dispatch(Closed { plane, contacts })
-            && self.arch.dispatch(Ask {
-                kernel: self,
-                contacts,
-                center,
-                question,
-            })
+        match self.narrow.dispatch(Closed { plane, contacts }) {
+            Closure::No => return Ok(false),
+            Closure::Unclear => return Err(Unclear),
+            Closure::Yes => {}
+        }
+        let levers = contacts.map(|contact| contact.point.distance_squared(center));
+        let reach = levers.into_iter().fold(0.0, greatest);
+        let least = self.plane.narrowest() * LONG_LEVERS;
+        if reach > least * least {
+            return Err(Unclear);
+        }
+        self.arch.dispatch(Ask {
+            kernel: self,
+            contacts,
+            center,
+            question,
+        });
+        // Of a grasp that is force closure there is a longest twist, unless rounding hid it.
+        match question {
+            Question::Longest | Question::LongestUpTo(_) if self.found.is_empty() => Err(Unclear),
+            _ => Ok(true),
+        }
     }
 
     /// Takes a proposed twist (in the frame of the plane) if, once it is on the boundary of P, it
@@ -235,7 +287,9 @@ impl Kernel {
         self.found.push(vertex);
         *limit = norm_squared;
         match question {
-            Question::LongestUpTo(enough) if norm_squared > enough => ControlFlow::Break(()),
+            Question::LongestUpTo(threshold) if vertex.quality() < threshold => {
+                ControlFlow::Break(())
+            }
             _ => ControlFlow::Continue(()),
         }
     }
@@ -257,11 +311,11 @@ struct Closed<'a> {
 }
 
 impl WithSimd for Closed<'_> {
-    type Output = bool;
+    type Output = Closure;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> bool {
-        self.plane.set_up(self.contacts) && self.plane.force_closure()
+    fn with_simd<S: Simd>(self, _: S) -> Closure {
+        self.plane.closure(self.contacts)
     }
 }
 
@@ -274,10 +328,10 @@ struct Ask<'a> {
 }
 
 impl WithSimd for Ask<'_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> bool {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self {
             kernel,
             contacts,
@@ -292,7 +346,6 @@ impl WithSimd for Ask<'_> {
         if kernel.apexes(simd, question, &mut limit).is_continue() {
             let _ = kernel.rays(simd, question, &mut limit);
         }
-        matches!(question, Question::LongerThan(_)) || !kernel.found.is_empty()
     }
 }
 

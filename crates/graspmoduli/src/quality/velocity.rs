@@ -1,8 +1,8 @@
 //! Twists from velocities of the contacts, in the frame of the contact plane.
 
-use super::Twist;
 use super::lanes::{Lane, Number, splat_each};
 use super::plane::Plane;
+use super::r6::Twist;
 use pulp::Simd;
 
 /// Twists from velocities of the contacts, in the frame of the plane.

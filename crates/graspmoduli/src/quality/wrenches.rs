@@ -1,7 +1,7 @@
 //! Wrench hulls of any number of contacts, by their farthest points.
 
-use super::Twist;
-use super::polytope::{Support, dot};
+use super::polytope::{Levels, Support};
+use super::r6::{Twist, add, dot};
 use crate::contact::{Contact, Frame, FrictionCone};
 use glam::DVec3;
 
@@ -32,8 +32,9 @@ pub(super) fn scale(contacts: &[Contact], center: DVec3, torsion: f64) -> f64 {
 /// The wrenches of a grasp with polygonal cones, torques divided by `scale`.
 #[derive(Debug, Clone)]
 pub(super) struct Wrenches {
-    /// Contact after contact.
+    /// Contact after contact, in an order of their own.
     pub all: Vec<Twist>,
+    order: Vec<usize>,
     per_contact: usize,
     pub scale: f64,
     norm: Norm,
@@ -43,21 +44,33 @@ impl Wrenches {
     pub fn new() -> Self {
         Self {
             all: Vec::new(),
+            order: Vec::new(),
             per_contact: 1,
             scale: 1.0,
             norm: Norm::Sum,
         }
     }
 
-    pub fn set(&mut self, contacts: &[Contact], center: DVec3, cone: &FrictionCone, norm: Norm) {
+    /// `order` is the order in which the contacts' wrenches are looked at.
+    pub fn set(
+        &mut self,
+        contacts: &[Contact],
+        order: &[usize],
+        center: DVec3,
+        cone: &FrictionCone,
+        norm: Norm,
+    ) {
         self.scale = scale(contacts, center, cone.torsion());
         self.per_contact = cone.generators();
         self.norm = norm;
+        self.order.clear();
+        self.order.extend_from_slice(order);
         self.all.clear();
-        for contact in contacts {
+        for &i in order {
+            let contact = &contacts[i];
             let frame = Frame::new(contact.normal);
             self.all.extend((0..self.per_contact).map(|k| {
-                let (local, spin) = cone.generator(k);
+                let (local, spin) = cone.generator(i, k);
                 wrench(contact, center, frame.turn(local), spin, self.scale)
             }));
         }
@@ -65,7 +78,10 @@ impl Wrenches {
 
     /// The contact of a wrench, and which of its generators it comes from.
     pub fn origin(&self, index: usize) -> (usize, usize) {
-        (index / self.per_contact, index % self.per_contact)
+        (
+            self.order[index / self.per_contact],
+            index % self.per_contact,
+        )
     }
 }
 
@@ -99,14 +115,36 @@ impl Support for Wrenches {
         }
         (sum, key)
     }
+
+    fn inside(&self, levels: Levels) -> Twist {
+        // Of every finger's hull, which has the origin as a corner if each has a limit of its own,
+        // and so of their sum; or of the one hull.
+        mean(
+            (0..)
+                .zip(&self.all)
+                .map(|(key, w)| (levels.spread(key), *w)),
+        )
+    }
+}
+
+/// The weighted mean of some vectors.
+fn mean(terms: impl Iterator<Item = (f64, Twist)>) -> Twist {
+    let (mut sum, mut total) = ([0.0; 6], 0.0);
+    for (weight, term) in terms {
+        sum = add(&sum, weight, &term);
+        total += weight;
+    }
+    sum.map(|c| c / total)
 }
 
 /// Contacts with circular friction cones.
 #[derive(Debug)]
 pub(super) struct Circular<'a> {
     pub contacts: &'a [Contact],
+    /// The order in which contacts are looked at.
+    pub order: &'a [usize],
     pub center: DVec3,
-    pub friction: f64,
+    pub cone: &'a FrictionCone,
     pub scale: f64,
 }
 
@@ -115,9 +153,11 @@ impl Support for Circular<'_> {
         let mut best = ([0.0; 6], f64::NEG_INFINITY);
         let linear = DVec3::new(x[0], x[1], x[2]);
         let angular = DVec3::new(x[3], x[4], x[5]) / self.scale;
-        for contact in self.contacts {
+        for &i in self.order {
+            let contact = &self.contacts[i];
             let velocity = linear + angular.cross(contact.point - self.center);
-            let force = contact.normal + sideways(velocity, contact.normal) * self.friction;
+            let friction = self.cone.friction(i);
+            let force = contact.normal + sideways(velocity, contact.normal) * friction;
             let wrench = wrench(contact, self.center, force, 0.0, self.scale);
             let height = dot(x, &wrench);
             if height > best.1 {
@@ -130,6 +170,19 @@ impl Support for Circular<'_> {
             .iter()
             .fold(0u64, |key, c| key.rotate_left(9) ^ c.to_bits());
         (best.0, key)
+    }
+
+    fn inside(&self, levels: Levels) -> Twist {
+        // A triangle of edges within each cone, more of one than of the next.
+        mean((0..).zip(self.order).flat_map(|(number, &i)| {
+            let contact = &self.contacts[i];
+            let frame = Frame::new(contact.normal);
+            (0..3).map(move |k| {
+                let force = self.cone.edge(i, &frame, k * self.cone.len() / 3);
+                let weight = levels.spread(3 * number + k as u64);
+                (weight, wrench(contact, self.center, force, 0.0, self.scale))
+            })
+        }))
     }
 }
 

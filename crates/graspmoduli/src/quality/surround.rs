@@ -1,0 +1,160 @@
+//! Is the origin in the interior of a convex hull in R⁶ that is known only by its farthest points?
+//!
+//! Let m be a point in the interior of the hull, relative to its dimension. If the origin is in
+//! the interior, the ray from it through d = −m leaves the hull through a facet: d = Σ λ_k w_k
+//! with λ ≥ 0 and six points w_k of the hull, and these and m are a simplex about the origin. If
+//! it is not, the hull lies behind a plane through the origin, and d before it.
+//!
+//! Both are answers of the simplex method to: maximise ⟨x, d⟩ with ⟨x, w⟩ ≤ 1 for all points w of
+//! the hull. Its columns are the points w, generated when they are needed by asking for the
+//! farthest point in the direction x. It starts from six artificial columns ± e_k that cost more
+//! than any real one, so that x has two parts: that of the artificial costs counts first, and
+//! when no point of the hull lies beyond it, it is the normal of the separating plane.
+
+use super::polytope::{Levels, Support};
+use super::r6::{Twist, add, dot, unit};
+
+/// A hull that reaches no farther than this beyond a plane through the origin, in units of forces
+/// and of torques over the longest lever arm, does not contain the origin in its interior: it is
+/// on the boundary. All that this library says of force closure rests on this number.
+pub(super) const BOUNDARY: f64 = 1e-12;
+/// Steps before the method counts as failed; it needs about a dozen.
+const MOST_STEPS: usize = 500;
+/// An entry of a column, relative to the largest, that is too small to divide by.
+const PIVOT: f64 = 1e-11;
+
+/// Where the origin is.
+pub(super) enum Position {
+    /// In the interior of this simplex of points of the hull.
+    Surrounded(Simplex),
+    /// Not in the interior of the hull: a unit x with ⟨x, w⟩ ≤ [`BOUNDARY`] for all its points.
+    Separated(Twist),
+}
+
+/// Seven points about the origin, and its facets by their polar vertices.
+#[derive(Debug, Clone)]
+pub(super) struct Simplex {
+    /// The last one is the point in the interior of the hull.
+    pub points: [Twist; 7],
+    /// The x with ⟨x, p⟩ = level of p for all points p but that of the same index.
+    pub facets: [Twist; 7],
+}
+
+/// `None` where rounding keeps the method from an answer.
+pub(super) fn surround(support: &impl Support, levels: Levels) -> Option<Position> {
+    let inside = support.inside(levels);
+    let mut basis = Basis::artificial(&inside.map(|c| -c));
+    for _ in 0..MOST_STEPS {
+        let artificial = basis.artificial > 0;
+        let x = basis.polar(|column| match (artificial, column.level) {
+            (true, level) => f64::from(level.is_none()),
+            (false, level) => level.unwrap_or_default(),
+        });
+        let (point, key) = support.farthest(&x);
+        let height = dot(&x, &point);
+        let level = levels.of(key);
+        if artificial {
+            let (direction, length) = unit(&x);
+            if height <= BOUNDARY * length {
+                return Some(Position::Separated(direction));
+            }
+        } else if height <= level * (1.0 + 1e-14 * dot(&x, &x).sqrt()) {
+            return basis.simplex(&x, &inside).map(Position::Surrounded);
+        }
+        basis.enter(point, level)?;
+    }
+    None
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    point: Twist,
+    /// What ⟨x, point⟩ must not exceed; `None` if the column is artificial.
+    level: Option<f64>,
+}
+
+/// Six columns, the inverse of their matrix, and the weights λ ≥ 0 with Σ λ_k w_k = d.
+struct Basis {
+    columns: [Column; 6],
+    inverse: [Twist; 6],
+    weights: [f64; 6],
+    artificial: usize,
+}
+
+impl Basis {
+    fn artificial(d: &Twist) -> Self {
+        let signs = d.map(|c| 1.0_f64.copysign(c));
+        let axis = |k: usize| -> Twist {
+            let mut point = [0.0; 6];
+            point[k] = signs[k];
+            point
+        };
+        Self {
+            columns: std::array::from_fn(|k| Column {
+                point: axis(k),
+                level: None,
+            }),
+            inverse: std::array::from_fn(axis),
+            weights: d.map(f64::abs),
+            artificial: 6,
+        }
+    }
+
+    /// The x with ⟨x, w_k⟩ = cost of column k.
+    fn polar(&self, cost: impl Fn(&Column) -> f64) -> Twist {
+        let mut x = [0.0; 6];
+        for (column, row) in self.columns.iter().zip(&self.inverse) {
+            x = add(&x, cost(column), row);
+        }
+        x
+    }
+
+    /// Exchanges a column for a point of the hull, so that the weights stay positive.
+    fn enter(&mut self, point: Twist, level: f64) -> Option<()> {
+        let entries = self.inverse.map(|row| dot(&row, &point));
+        let largest = entries.iter().fold(0.0_f64, |a, c| a.max(c.abs()));
+        let mut leaving = None;
+        let mut least = f64::INFINITY;
+        for k in 0..6 {
+            if entries[k] <= PIVOT * largest {
+                continue;
+            }
+            let ratio = self.weights[k].max(0.0) / entries[k];
+            if ratio < least {
+                (least, leaving) = (ratio, Some(k));
+            }
+        }
+        let leaving = leaving?;
+        let head = self.inverse[leaving].map(|c| c / entries[leaving]);
+        for k in 0..6 {
+            if k == leaving {
+                self.inverse[k] = head;
+                self.weights[k] = least;
+            } else {
+                self.inverse[k] = add(&self.inverse[k], -entries[k], &head);
+                self.weights[k] -= entries[k] * least;
+            }
+        }
+        self.artificial -= usize::from(self.columns[leaving].level.is_none());
+        self.columns[leaving] = Column {
+            point,
+            level: Some(level),
+        };
+        Some(())
+    }
+
+    /// The columns and the point inside; x is the facet through the columns.
+    fn simplex(&self, x: &Twist, inside: &Twist) -> Option<Simplex> {
+        // A facet through the point inside turns about the ridge without column k: along row k of
+        // the inverse, in which the point inside lies −λ_k deep.
+        let gap = 1.0 - dot(x, inside);
+        let mut points = [*inside; 7];
+        let mut facets = [*x; 7];
+        for k in 0..6 {
+            points[k] = self.columns[k].point;
+            facets[k] = add(x, -gap / self.weights[k], &self.inverse[k]);
+        }
+        let sound = facets.iter().flatten().all(|c| c.is_finite());
+        (sound && self.weights.iter().all(|&w| w > 0.0)).then_some(Simplex { points, facets })
+    }
+}
