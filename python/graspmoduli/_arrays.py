@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
 from ._core import GraspModuliError
 
 Floats = NDArray[np.float64]
@@ -24,7 +23,7 @@ MOST_EDGES = 2**16
 MOST_FRICTION = 1e6
 
 
-def floats(name: str, value: ArrayLike) -> Floats:
+def floats(name: str, value: Any) -> Floats:
     """``value`` as a contiguous float64 array of finite numbers."""
     return finite(name, numbers(name, value))
 
@@ -64,7 +63,7 @@ def finite(name: str, array: Floats) -> Floats:
     return array
 
 
-def vectors(name: str, value: ArrayLike, shape: str) -> Floats:
+def vectors(name: str, value: Any, shape: str) -> Floats:
     """An array with at least as many axes as ``shape`` names, the last of length 3."""
     array = numbers(name, value)
     if array.ndim < shape.count(",") or array.shape[-1] != 3:
@@ -88,7 +87,7 @@ def unit(name: str, array: Floats) -> Floats:
     return np.where(exact[..., None], array, array / lengths[..., None])
 
 
-def coordinates(u: ArrayLike, theta: ArrayLike) -> tuple[Floats, Floats, tuple[int, ...]]:
+def coordinates(u: Any, theta: Any) -> tuple[Floats, Floats, tuple[int, ...]]:
     """(u, θ) as flat arrays of equal length, and their common shape."""
     us, thetas = floats("u", u), floats("theta", theta)
     if ((us < 0.0) | (us > 1.0)).any():

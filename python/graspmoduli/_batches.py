@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._arrays import (
@@ -61,7 +61,7 @@ class Batch(NamedTuple):
     #: Contacts, centres of mass and torsion before that, not broadcast.
     given: tuple[Floats, Floats, float]
 
-    def shaped(self, values: Floats) -> Any:
+    def shaped(self, values: NDArray[Any]) -> Any:
         """One value per grasp: a Python number for a single grasp."""
         return values.reshape(self.shape) if self.shape else values[0].item()
 
@@ -70,10 +70,10 @@ def batch(
     contacts: Any,
     normals: ArrayLike | None,
     center_of_mass: ArrayLike | None,
-    friction: ArrayLike | None = None,
-    edges: int | None = None,
-    torsion: float | None = None,
-    length_scale: ArrayLike | None = None,
+    friction: Any = None,
+    edges: Any = None,
+    torsion: Any = None,
+    length_scale: Any = None,
 ) -> Batch:
     """Everything that is asked about grasps, checked and broadcast."""
     several = _several(contacts)
@@ -104,7 +104,7 @@ def batch(
     if m == 0:
         raise GraspModuliError(f"contacts must be at least one per grasp, got {points.shape}")
     mu = frictions_of(friction, m)
-    scale = np.float64(1.0) if length_scale is None else floats("length_scale", length_scale)
+    scale = np.array(1.0) if length_scale is None else floats("length_scale", length_scale)
     if (scale <= 0.0).any():
         raise GraspModuliError(f"length_scale must be positive, got {scale.min()}")
     try:
@@ -161,8 +161,8 @@ def frictions_of(friction: ArrayLike | None, m: int, *, positive: bool = False) 
     mu = floats("friction", FRICTION if friction is None else friction)
     if mu.ndim == 0:
         # With one friction for all, the sentence is about a number.
-        value = number("friction", friction, positive=True) if positive else None
-        mu = np.array([coefficient("friction", mu.item()) if value is None else value])
+        one = number("friction", mu.item(), positive=positive)
+        mu = np.array([coefficient("friction", one)])
     if mu.shape[-1] not in (1, m):
         raise GraspModuliError(
             f"friction must be a number or have shape (..., {m}), one per contact, got {mu.shape}"

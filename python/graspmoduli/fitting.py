@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Floats, a_path, brief, count, floats, locked, vectors
+from ._arrays import Floats, a_path, brief, count, finite, floats, locked, vectors
 from ._batches import carried, fingers
 from ._core import GraspModuliError
 from ._files import replacing
@@ -121,9 +121,7 @@ class Fit(Value):
         grasps = [self.in_object(ranked.grasp, friction=friction, edges=edges) for ranked in found]
         return sorted((g for g in grasps if g.quality > 0.0), key=lambda grasp: -grasp.quality)
 
-    def in_object(
-        self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
-    ) -> ObjectGrasp:
+    def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""
         a_grasp("grasp", grasp)
         contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
@@ -255,11 +253,13 @@ class Fit(Value):
 
     def to_object(self, points: ArrayLike) -> Floats:
         """Points from the surface's to the object's coordinates. Shape (..., 3)."""
-        return floats("points", vectors("points", points, "(..., 3)")) @ self.pose[:3, :3].T + self.pose[:3, 3]
+        given = finite("points", vectors("points", points, "(..., 3)"))
+        return given @ self.pose[:3, :3].T + self.pose[:3, 3]
 
     def directions_to_object(self, directions: ArrayLike) -> Floats:
         """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
-        return floats("directions", vectors("directions", directions, "(..., 3)")) @ self.pose[:3, :3].T
+        given = finite("directions", vectors("directions", directions, "(..., 3)"))
+        return given @ self.pose[:3, :3].T
 
 
 def fit(
@@ -295,9 +295,7 @@ def fit_object(thing: Object, progress: Callable[[int, int], object] | None = No
     return _fitted(thing, progress, stacklevel=3)
 
 
-def _fitted(
-    thing: Object, progress: Callable[[int, int], object] | None, stacklevel: int
-) -> Fit:
+def _fitted(thing: Object, progress: Callable[[int, int], object] | None, stacklevel: int) -> Fit:
     """The fit; ``stacklevel``, from here, is that of whom warnings are for."""
     candidates = candidate_axes(thing)
     scored: list[tuple[float, Axis]] = []

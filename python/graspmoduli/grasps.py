@@ -161,12 +161,12 @@ def place(surface: Surface | Sequence[Surface], grasp: Grasp) -> PlacedGrasp | l
     """
     if isinstance(surface, list | tuple):
         return [place(one, grasp) for one in surface]
-    a_surface("surface", surface)
+    one = a_surface("surface", surface)
     a_grasp("grasp", grasp)
     return PlacedGrasp(
-        surface.points(grasp.u, grasp.theta),
-        surface.normals(grasp.u, grasp.theta),
-        surface.center_of_mass,
+        one.points(grasp.u, grasp.theta),
+        one.normals(grasp.u, grasp.theta),
+        one.center_of_mass,
     )
 
 

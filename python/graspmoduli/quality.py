@@ -25,20 +25,6 @@ NORMS = ("sum", "each")
 
 @overload
 def quality(
-    contacts: GraspLike,
-    normals: None = None,
-    center_of_mass: ArrayLike | None = None,
-    *,
-    friction: float | None = None,
-    edges: int | None = None,
-    torsion: float | None = None,
-    norm: str = "sum",
-    length_scale: float | None = None,
-) -> float: ...
-
-
-@overload
-def quality(
     contacts: ArrayLike | Sequence[GraspLike],
     normals: ArrayLike | None = None,
     center_of_mass: ArrayLike | None = None,
@@ -49,6 +35,20 @@ def quality(
     norm: str = "sum",
     length_scale: ArrayLike | None = None,
 ) -> Any: ...
+
+
+@overload
+def quality(
+    contacts: GraspLike,
+    normals: None = None,
+    center_of_mass: ArrayLike | None = None,
+    *,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    norm: str = "sum",
+    length_scale: float | None = None,
+) -> float: ...
 
 
 def quality(

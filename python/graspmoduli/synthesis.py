@@ -213,6 +213,7 @@ def ranked_grasp(
 
 
 def center_of(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, float, float]:
+    """The centre of mass given, or the surface's own."""
     center: Floats = (
         surface.center_of_mass
         if center_of_mass is None

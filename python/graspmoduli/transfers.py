@@ -196,7 +196,7 @@ def transfer(
         at = [grasp_at for grasp_at, _, _ in arrived]
         for i, (_, path, more) in enumerate(arrived):
             # The end of one is the start of the next.
-            paths[i].append(path[1 if k else 0 :] + [float(k), 0.0])
+            paths[i].append(path[min(k, 1) :] + np.array([k, 0.0]))
             evaluations[i] += more
     carried_over = [
         _arrived(chain[-1], Grasp(x[:, 0], x[:, 1]), hand, np.concatenate(path), spent)
@@ -205,9 +205,7 @@ def transfer(
     return carried_over if several else carried_over[0]
 
 
-def _arrived(
-    target: Surface, grasp: Grasp, hand: Cone, path: Floats, evaluations: int
-) -> Transfer:
+def _arrived(target: Surface, grasp: Grasp, hand: Cone, path: Floats, evaluations: int) -> Transfer:
     z = target.center_of_mass
     ranked = ranked_grasp(target, grasp, (float(z[0]), float(z[1]), float(z[2])), hand)
     path[-1, 1] = ranked.quality

@@ -221,7 +221,9 @@ class WrenchSpace:
         if found is None:
             # Contacts do no positive work along the twist, the load, −target, does along minus it.
             proof = -twist / self._reach
-            return Resistance(None, None, np.inf, locked(proof / np.linalg.norm(proof * self._units)))
+            return Resistance(
+                None, None, np.inf, locked(proof / np.linalg.norm(proof * self._units))
+            )
         forces, spins = self._generators
         weights = found.reshape(len(self.contacts), -1) * size
         return Resistance(
