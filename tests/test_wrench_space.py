@@ -101,7 +101,7 @@ def test_numbers_for_comparison():
 
 
 def test_wrong_input():
-    with pytest.raises(gm.GraspModuliError, match="one grasp, got"):
+    with pytest.raises(gm.GraspModuliError, match="one grasp, of shape"):
         gm.WrenchSpace([CIRCLE], [-CIRCLE], ORIGIN)
     with pytest.raises(gm.GraspModuliError, match="wrench must have shape"):
         gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN).resist([1, 0, 0])
