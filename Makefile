@@ -36,12 +36,13 @@ test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwrig
 	    --editable '.[view]' 'playwright>=1.50'
 	$(BIN)/pytest tests/browser
 
-lint: $(READY) ## Formatting, clippy, ruff and types
+lint: $(READY) ## Formatting, clippy, ruff, types and the stubs of the binding
 	cargo fmt --check
 	cargo clippy --release --all-targets --quiet -- --deny warnings
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
+	$(BIN)/stubtest graspmoduli._core
 
 format: $(READY) ## Format the sources
 	cargo fmt

@@ -87,8 +87,14 @@ class TestSearch:
         best = gm.best_grasps(surface, u, theta, contacts=m, top=10)
         wanted = np.sort(q)[::-1][:10]
         np.testing.assert_array_equal([b.quality for b in best], wanted[wanted > 0])
-        for ranked, chosen in zip(best, index[np.argsort(-q, kind="stable")], strict=False):
-            np.testing.assert_array_equal(ranked.grasp.u, u[chosen])
+        # A finger more or less often changes nothing: among equals any one will do.
+        order = np.argsort(-q, kind="stable")
+        gaps = np.diff(np.concatenate([[-np.inf], -q[order], [np.inf]]))
+        for rank, ranked in enumerate(best):
+            if min(gaps[rank], gaps[rank + 1]) > 1e-9:
+                np.testing.assert_array_equal(ranked.grasp.u, u[index[order[rank]]])
+        placed = [gm.place(surface, ranked.grasp).quality() for ranked in best]
+        np.testing.assert_allclose(placed, wanted[wanted > 0], rtol=1e-12)
         again = gm.best_grasps(surface, u, theta, contacts=m, top=10, threads=1)
         assert again == best
 

@@ -44,7 +44,8 @@ class TestQualityAlong:
 
     def test_a_dip_between_samples_is_found(self):
         # Down and up again within the one interval that is sampled.
-        start, end = ((MODELS[n], gm.synthesize(MODELS[n], top=1)[0].grasp) for n in "cf")
+        start = MODELS["c"], gm.Grasp([0.32, 0.32, 0.57], [1.96, 4.13, 6.18])
+        end = MODELS["f"], gm.Grasp([0.5, 0.0, 1.0], [0.0, 3.14, 3.14])
         fine = gm.quality_along(start, end, samples=2000)
         assert 0.0 < fine.worst_quality < 0.1 * min(fine.quality[0], fine.quality[-1])
         for samples in (1, 5, 16, 50):

@@ -1,6 +1,9 @@
 """Twelve model surfaces a–l of the kinds in Fig. 2 of the paper, all within the unit ball.
 
 a–d are surfaces of revolution, e–l are not. :data:`MODELS` maps their names to surfaces.
+
+Their coefficients have the same bits on every processor: sines, powers and the like are those of
+the core, since NumPy's differ in last bits between instruction sets. The rest is arithmetic.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from ._arrays import Floats
-from ._core import GraspModuliError
+from ._core import GraspModuliError, cos, exp, power, sin
 from .surfaces import Surface
 
 Radius = Callable[[Floats, Floats], Floats]
@@ -20,18 +23,20 @@ Radius = Callable[[Floats, Floats], Floats]
 def _smooth(x: Floats, low: float, high: float) -> Floats:
     """0 below ``low``, 1 above ``high``, smooth to the second derivative in between."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t**3 * (10.0 + t * (6.0 * t - 15.0))
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 
 def _bump(x: Floats, center: float, width: float) -> Floats:
-    return np.exp(-(((x - center) / width) ** 2))
+    scaled = (x - center) / width
+    return exp(-scaled * scaled)
 
 
-def _polygon(theta: Floats, sides: int, power: float) -> Floats:
-    """A regular polygon of inner radius 1 with rounded corners; sharper with a higher power."""
-    angles = 2 * np.pi * np.arange(sides) / sides
-    faces = np.maximum(np.cos(theta[..., None] - angles), 0.0) ** power
-    return faces.sum(axis=-1) ** (-1.0 / power)
+def _polygon(theta: Floats, sides: int, sharpness: float) -> Floats:
+    """A regular polygon of inner radius 1 with rounded corners; the sharper the higher the last."""
+    total = np.zeros(theta.shape)
+    for side in range(sides):
+        total += power(np.maximum(cos(theta - 2 * np.pi * side / sides), 0.0), sharpness)
+    return power(total, -1.0 / sharpness)
 
 
 def _bottle(u: Floats, theta: Floats) -> Floats:
@@ -39,7 +44,7 @@ def _bottle(u: Floats, theta: Floats) -> Floats:
 
 
 def _glass(u: Floats, theta: Floats) -> Floats:
-    return 0.30 + 0.16 * u - 0.06 * _bump(u, 0.0, 0.06) + 0.04 * u**3
+    return 0.30 + 0.16 * u - 0.06 * _bump(u, 0.0, 0.06) + 0.04 * u * u * u
 
 
 def _vase(u: Floats, theta: Floats) -> Floats:
@@ -53,13 +58,13 @@ def _top(u: Floats, theta: Floats) -> Floats:
 
 def _box(u: Floats, theta: Floats) -> Floats:
     # Flat walls with rounded edges; domed lids that close to a small hole.
-    side = (np.abs(np.cos(theta) / 0.46) ** 8 + np.abs(np.sin(theta) / 0.34) ** 8) ** -0.125
+    side = power(power(cos(theta) / 0.46, 8.0) + power(sin(theta) / 0.34, 8.0), -0.125)
     lid = np.clip(np.abs(2.0 * u - 1.0) - 0.75, 0.0, None) / 0.25
-    return side * (1.0 - 0.8 * lid**3)
+    return side * (1.0 - 0.8 * lid * lid * lid)
 
 
 def _elliptic(u: Floats, theta: Floats) -> Floats:
-    ellipse = 1.0 / np.sqrt((np.cos(theta) / 0.52) ** 2 + (np.sin(theta) / 0.27) ** 2)
+    ellipse = 1.0 / np.sqrt((cos(theta) / 0.52) ** 2 + (sin(theta) / 0.27) ** 2)
     return ellipse * (1.0 - 0.22 * (2.0 * u - 1.0) ** 2)
 
 
@@ -68,21 +73,21 @@ def _twisted(u: Floats, theta: Floats) -> Floats:
 
 
 def _fluted(u: Floats, theta: Floats) -> Floats:
-    column = 0.40 + 0.06 * np.sin(np.pi * u)
-    return column * (1.0 + 0.09 * np.cos(7.0 * theta) * np.sin(np.pi * u) ** 2)
+    column = 0.40 + 0.06 * sin(np.pi * u)
+    return column * (1.0 + 0.09 * cos(7.0 * theta) * sin(np.pi * u) ** 2)
 
 
 def _bent(u: Floats, theta: Floats) -> Floats:
     # A round bar whose centre line bows away from the axis.
     offset = 0.17 * (1.0 - 2.0 * (2.0 * u - 1.0) ** 2)
     thickness = 0.33 - 0.05 * u
-    inside = np.sqrt(thickness**2 - (offset * np.sin(theta)) ** 2)
-    return offset * np.cos(theta) + inside
+    inside = np.sqrt(thickness**2 - (offset * sin(theta)) ** 2)
+    return offset * cos(theta) + inside
 
 
 def _pear(u: Floats, theta: Floats) -> Floats:
     profile = 0.14 + 0.42 * _bump(u, 0.27, 0.27) + 0.10 * _bump(u, 0.72, 0.22)
-    return profile * (1.0 + 0.14 * np.cos(theta) * (1.0 - u) + 0.07 * np.sin(2.0 * theta) * u)
+    return profile * (1.0 + 0.14 * cos(theta) * (1.0 - u) + 0.07 * sin(2.0 * theta) * u)
 
 
 def _faceted(u: Floats, theta: Floats) -> Floats:
@@ -92,8 +97,8 @@ def _faceted(u: Floats, theta: Floats) -> Floats:
 
 def _grip(u: Floats, theta: Floats) -> Floats:
     # A handle: oval, with three finger grooves on one side.
-    oval = 0.27 / np.sqrt(1.0 - 0.45 * np.cos(theta) ** 2)
-    front = (0.5 + 0.5 * np.cos(theta)) ** 2
+    oval = 0.27 / np.sqrt(1.0 - 0.45 * cos(theta) ** 2)
+    front = (0.5 + 0.5 * cos(theta)) ** 2
     grooves = sum(_bump(u, center, 0.09) for center in (0.25, 0.5, 0.75))
     return oval * (1.0 - 0.2 * grooves * front) * (1.0 + 0.1 * (2.0 * u - 1.0) ** 2)
 

@@ -93,7 +93,7 @@ class Surface:
         rows, columns = 8, 8
         while True:
             u, theta = _greville(rows), 2 * np.pi * np.arange(columns) / columns
-            coefficients = _interpolate(sample(u, theta), rows)
+            coefficients = _core.interpolate(np.ascontiguousarray(sample(u, theta)))
             scale = float(coefficients.max())
             fine_u = ((np.arange(rows)[:, None] + offsets) / rows).ravel()
             fine_theta = ((np.arange(columns)[:, None] + offsets) * 2 * np.pi / columns).ravel()
@@ -404,19 +404,6 @@ def _greville(intervals: int) -> Floats:
     """The sites at which a clamped cubic spline is interpolated stably."""
     knots = clamped_knots(intervals)
     return (knots[1:-3] + knots[2:-2] + knots[3:-1]) / 3.0
-
-
-def _interpolate(values: Floats, intervals: int) -> Floats:
-    """Coefficients from values at the Greville sites in u and the knots in θ."""
-    from scipy.interpolate import make_interp_spline
-
-    knots = clamped_knots(intervals)
-    rows = make_interp_spline(_greville(intervals), values, k=3, t=knots).c
-    # (c_j + 4 c_{j+1} + c_{j+2})/6 = value_j is a convolution.
-    columns = values.shape[1]
-    shift = np.exp(2j * np.pi * np.fft.rfftfreq(columns))
-    spectrum = np.fft.rfft(rows, axis=1) * 6.0 / (1.0 + 4.0 * shift + shift**2)
-    return np.ascontiguousarray(np.fft.irfft(spectrum, columns, axis=1))
 
 
 def _error(coefficients: Floats, values: Floats, u: Floats, theta: Floats) -> float:

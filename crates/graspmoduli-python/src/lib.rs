@@ -2,6 +2,7 @@
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
 mod domain;
+mod math;
 mod quality;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
@@ -388,6 +389,8 @@ fn transferred(py: Python<'_>, carried: Vec<Carried>) -> PyResult<Vec<Transferre
 mod _core {
     #[pymodule_export]
     use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
+    #[pymodule_export]
+    use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
     #[pymodule_export]
     use super::quality::{
         circular_quality, contact_forces, extreme_quality, is_clean, quality, quality_at_least,

@@ -6,6 +6,7 @@
 //! facets nearby to Q + η, ⟨∇q_k, d⟩ ≥ Q + η − q_k; the gain η that is asked for adapts to the
 //! gain that comes. No step with q_k + ⟨∇q_k, d⟩ > Q for all k: a maximum.
 
+use crate::math;
 use crate::nnls::shortest_step;
 use crate::quality::Evaluator;
 use crate::surface::Surface;
@@ -245,7 +246,10 @@ impl Region for Cells<'_> {
         let rows = self.allowed.len() / self.columns;
         let far = |to: &[f64; 2]| {
             let turn = (to[1] - at[1]).rem_euclid(TAU);
-            (lengths[0] * (to[0] - at[0])).hypot(lengths[1] * turn.min(TAU - turn))
+            math::hypot(
+                lengths[0] * (to[0] - at[0]),
+                lengths[1] * turn.min(TAU - turn),
+            )
         };
         self.allowed
             .iter()

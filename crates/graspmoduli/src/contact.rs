@@ -1,6 +1,7 @@
 //! Contact frames and friction cones (Sec. II of the paper).
 
 use crate::error::Error;
+use crate::math;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -52,7 +53,7 @@ impl FrictionCone {
             return Err(Error::Edges(edges));
         }
         let at = |turns: f64| {
-            let (sin, cos) = (TAU * turns / edges as f64).sin_cos();
+            let (sin, cos) = math::sin_cos(TAU * turns / edges as f64);
             [cos, sin]
         };
         // The paper counts j = 1…l; j = 0 and j = l are the same edge, so the set is the same.
@@ -61,7 +62,7 @@ impl FrictionCone {
             torsion: 0.0,
             edges: (0..edges).map(|j| at(j as f64)).collect(),
             rays: (0..edges).map(|j| at(j as f64 + 0.5)).collect(),
-            inner: (TAU / (2.0 * edges as f64)).cos(),
+            inner: math::cos(TAU / (2.0 * edges as f64)),
         })
     }
 

@@ -18,6 +18,7 @@
 //! | [`contact`] | contact frames, friction cones |
 //! | [`quality`] | exact $Q_l$ and its gradient |
 //! | [`surface`] | spline surfaces: points, normals, integrals, convex-cone operations |
+//! | [`interpolation`] | splines through given values, banded systems |
 //! | [`sampling`] | area-uniform points |
 //! | [`search`] | the best of all subsets of contacts |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
@@ -25,6 +26,7 @@
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
 //! | [`domain`] | random grasps in the domain D(1), and near each other |
 //! | [`transfer`] | carrying grasps from one surface to another |
+//! | [`math`] | sine, cosine and the like, the same on every processor |
 //! | [`error`] | what can be wrong with a request |
 //!
 //! No global state: threads and random numbers are arguments.
@@ -34,6 +36,8 @@ pub mod contact;
 pub mod distance;
 pub mod domain;
 pub mod error;
+pub mod interpolation;
+pub mod math;
 mod nnls;
 pub mod quality;
 pub mod sampling;

@@ -2,6 +2,7 @@
 
 use crate::contact::Contact;
 use crate::error::Error;
+use crate::math;
 use crate::spline::{Basis, Local};
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -168,7 +169,7 @@ impl Surface {
             bend: [fuu, fut, ftt],
         } = self.radius(u, theta);
         let h = self.top - self.bottom;
-        let (sin, cos) = theta.sin_cos();
+        let (sin, cos) = math::sin_cos(theta);
         let turn = |v: DVec3| DVec3::new(v.x * cos - v.y * sin, v.x * sin + v.y * cos, v.z);
         let cross = DVec3::new(-h * f, h * ft, f * fu);
         let length = cross.length();
@@ -193,7 +194,7 @@ impl Surface {
             slope: [fu, ft],
             bend: [fuu, fut, ftt],
         } = self.radius(u, theta);
-        let (sin, cos) = theta.sin_cos();
+        let (sin, cos) = math::sin_cos(theta);
         let turn = |r: f64, t: f64| DVec3::new(r * cos - t * sin, r * sin + t * cos, 0.0);
         [turn(fuu, 0.0), turn(fut, fu), turn(ftt - f, 2.0 * ft)]
     }
@@ -260,7 +261,7 @@ impl Surface {
         let thetas: Vec<(Local, f64, f64, f64)> = thetas
             .iter()
             .map(|&(theta, weight)| {
-                let (sin, cos) = theta.sin_cos();
+                let (sin, cos) = math::sin_cos(theta);
                 (self.theta_basis.at(theta / TAU), sin, cos, weight)
             })
             .collect();
@@ -439,7 +440,8 @@ impl Surface {
         let mut farthest: f64 = 0.0;
         for (i, k) in (0..=steps).flat_map(|i| (0..steps).map(move |k| (i, k))) {
             let (u, theta) = (i as f64 / steps as f64, TAU * k as f64 / steps as f64);
-            let planar = DVec2::from_angle(theta) * self.radius(u, theta).value;
+            let (sin, cos) = math::sin_cos(theta);
+            let planar = DVec2::new(cos, sin) * self.radius(u, theta).value;
             farthest = farthest.max(planar.extend(self.height(u)).distance(center));
         }
         farthest
@@ -486,7 +488,7 @@ mod tests {
     /// Radius of neither revolution nor any symmetry.
     fn wavy(rows: usize, columns: usize) -> Surface {
         let coefficients = (0..rows * columns)
-            .map(|i| 0.5 + 0.1 * (3.7 * i as f64).sin())
+            .map(|i| 0.5 + 0.1 * math::sin(3.7 * i as f64))
             .collect();
         Surface::new(-0.4, 0.7, columns, coefficients).unwrap()
     }

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
+use graspmoduli::math;
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -173,7 +174,7 @@ proptest! {
         // Turns about e₃ by multiples of 2π/l, a mirror image y → −y, and any translation.
         let angle = std::f64::consts::TAU * turns as f64 / cone.len() as f64;
         let flip = DVec3::new(1.0, if turns % 2 == 0 { -1.0 } else { 1.0 }, 1.0);
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = math::sin_cos(angle);
         let move_vector = |v: DVec3| {
             let v = v * flip;
             DVec3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
@@ -260,7 +261,7 @@ proptest! {
         (contacts, center) in hand(tame), mu in 0.1..1.5_f64, l in 4..17usize, torsion in 0.01..0.3_f64
     ) {
         let cone = FrictionCone::new(mu, l).unwrap();
-        let around = FrictionCone::new(mu / (std::f64::consts::PI / l as f64).cos(), l).unwrap();
+        let around = FrictionCone::new(mu / math::cos(std::f64::consts::PI / l as f64), l).unwrap();
         let mut evaluator = Evaluator::new(&cone);
         let quality = evaluator.quality(&contacts, center);
         let (lower, upper) = evaluator.circular(&contacts, center, 1e-2);
@@ -281,7 +282,7 @@ fn batches_agree_with_single_grasps() {
     let cone = FrictionCone::new(1.0, 8).unwrap();
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / 3.0;
     let points: Vec<[f64; 3]> = (0..3)
-        .map(|i| [angle(i).cos(), angle(i).sin(), 0.0])
+        .map(|i| [math::cos(angle(i)), math::sin(angle(i)), 0.0])
         .collect();
     let normals: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| -x)).collect();
     let many = Batch {

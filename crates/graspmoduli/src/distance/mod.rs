@@ -617,7 +617,9 @@ mod tests {
         let first = surface(0.6, 3, 9, 8);
         for size in [1e-3, 1e-9] {
             let moved = first.coefficients().iter().enumerate();
-            let moved = moved.map(|(k, c)| c + size * (k as f64).sin()).collect();
+            let moved = moved
+                .map(|(k, c)| c + size * crate::math::sin(k as f64))
+                .collect();
             let second = Surface::new(-0.6, 0.6, 8, moved).unwrap();
             let found = surface_distance(&first, &second, 1e-6).unwrap();
             assert!(found.value > 0.1 * size && found.value < 100.0 * size);

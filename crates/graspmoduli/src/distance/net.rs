@@ -177,7 +177,8 @@ mod tests {
     #[test]
     fn derivatives_stay_within_their_ranges() {
         let (rows, columns) = (7, 5);
-        let coefficients = (0..rows * columns).map(|k| 1.0 + 0.5 * (1.7 * k as f64).sin());
+        let coefficients =
+            (0..rows * columns).map(|k| 1.0 + 0.5 * crate::math::sin(1.7 * k as f64));
         let surface = Surface::new(0.0, 1.0, columns, coefficients.collect()).unwrap();
         let wide = ranges_on_patches(surface.coefficients(), columns);
         let span = DVec2::new(0.5 / (rows - 3) as f64, 0.5 * TAU / columns as f64);

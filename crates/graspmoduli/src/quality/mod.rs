@@ -5,6 +5,7 @@
 
 mod apex_ray_face;
 mod gradient;
+mod instructions;
 mod lanes;
 mod plane;
 mod polytope;
@@ -16,6 +17,7 @@ mod velocity;
 mod wrenches;
 
 pub use gradient::Gradient;
+pub use instructions::instructions_name;
 pub(crate) use polytope::LARGEST_ERROR;
 pub use r6::Twist;
 pub use wrenches::Norm;
@@ -31,7 +33,7 @@ use three_contacts::Kernel;
 use wrenches::{Circular, Wrenches};
 
 /// Beyond so many edges per cone the expanding polytope is faster than the closed form.
-const MOST_EDGES: usize = 64;
+const MOST_EDGES: usize = 36;
 
 /// Working memory that evaluates grasps one after the other without allocating.
 ///
@@ -287,14 +289,11 @@ impl Evaluator {
             return None;
         }
         let [a, b, c] = three;
-        let order = match (before(b, a), before(c, b), before(c, a)) {
-            (false, false, _) => [0, 1, 2],
-            (true, false, false) => [1, 0, 2],
-            (false, true, false) => [0, 2, 1],
-            (false, true, true) => [2, 0, 1],
-            (true, false, true) => [1, 2, 0],
-            (true, true, _) => [2, 1, 0],
-        };
+        // Bit by bit, as each is as likely as not: branches would be mispredicted.
+        let key = usize::from(before(b, a))
+            | usize::from(before(c, b)) << 1
+            | usize::from(before(c, a)) << 2;
+        let order = BY_COMPARISON[key];
         if !self.cone.is_uniform() {
             let frictions = order.map(|i| self.cone.friction(i));
             self.kernel.set_frictions(&self.cone, frictions);
@@ -424,6 +423,19 @@ impl Evaluator {
         (!gradients.is_empty()).then_some(gradients)
     }
 }
+
+/// The order of three contacts, by whether the second comes before the first (bit 0), the third
+/// before the second (bit 1) and the third before the first (bit 2).
+const BY_COMPARISON: [[usize; 3]; 8] = [
+    [0, 1, 2],
+    [1, 0, 2],
+    [0, 2, 1],
+    [2, 1, 0],
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+];
 
 /// Lever arms that are numbers, and not all 0.
 fn usable(scale: f64) -> bool {

@@ -5,6 +5,7 @@
 //! three velocities concerns only their components in it, so both the test and the kernel are
 //! planar problems.
 
+use super::lanes::greatest;
 use super::velocity::Velocity;
 use crate::contact::{Contact, Frame, FrictionCone};
 use glam::{DMat3, DVec2, DVec3};
@@ -51,6 +52,10 @@ pub(super) fn at<const N: usize>(table: &Table<N>, index: usize) -> [f64; N] {
 const FLAT: f64 = 1e-5;
 /// The least angle, in radians, that is not taken for rounding; see [`Plane::force_closure`].
 const ANGLE: f64 = 1e-10;
+/// A ratio this near to 0 or to infinity is looked at with care; see [`Plane::force_closure`].
+const NEAR: f64 = 1e-3;
+/// More than six ratios away from there change by [`ANGLE`].
+const MARGIN: f64 = 1e-6;
 /// Added to the squared sine of a cone's half angle before a normal counts as too steep.
 const STEEP: f64 = 1e-9;
 /// Edges of cones, by their components out of the plane, that may as well lie in it.
@@ -129,6 +134,8 @@ fn padded(vectors: impl Iterator<Item = [f64; 2]>, count: usize, height: f64) ->
 pub(super) struct Plane {
     pub edges: usize,
     frictions: [f64; 3],
+    /// The squared sines of the steepest normals over the plane; see [`Plane::set_up`].
+    steepest: [f64; 3],
     edge_tables: [Table<3>; 3],
     /// Of unit length.
     ray_tables: [Table<3>; 3],
@@ -150,6 +157,7 @@ impl Plane {
         let mut plane = Self {
             edges: cone.len(),
             frictions: [f64::NAN; 3],
+            steepest: [0.0; 3],
             edge_tables: Default::default(),
             ray_tables: Default::default(),
             basis: DMat3::IDENTITY,
@@ -171,10 +179,11 @@ impl Plane {
             if friction == self.frictions[i] {
                 continue;
             }
+            self.steepest[i] = friction * friction / (1.0 + friction * friction) + STEEP;
             let edges = cone.edges.iter().map(|[x, y]| [friction * x, friction * y]);
             self.edge_tables[i] = padded(edges, cone.len(), 1.0);
             let height = -friction * cone.inner;
-            let length = height.hypot(1.0);
+            let length = (1.0 + height * height).sqrt();
             let rays = cone.rays.iter().map(|[x, y]| [x / length, y / length]);
             self.ray_tables[i] = padded(rays, cone.len(), height / length);
         }
@@ -198,10 +207,10 @@ impl Plane {
         let (first, second) = (contacts[1].point - origin, contacts[2].point - origin);
         let third = second - first;
         let normal = first.cross(second);
-        let longest = first
-            .length_squared()
-            .max(second.length_squared())
-            .max(third.length_squared());
+        let longest = greatest(
+            first.length_squared(),
+            greatest(second.length_squared(), third.length_squared()),
+        );
         let square = normal.length_squared();
         // Negated, so that NaN from overflow is unclear too, and so is what underflows.
         if !(square >= FLAT * FLAT * longest * longest && longest > 1e-60 && longest < 1e60) {
@@ -210,10 +219,9 @@ impl Plane {
         // The circular cone reaches to both sides of the plane where |n·z| < μ/√(1 + μ²); the
         // polygonal one lies within it. Half of all grasps end here, before any division.
         let mut steep = false;
-        for (contact, friction) in contacts.iter().zip(self.frictions) {
+        for (contact, steepest) in contacts.iter().zip(self.steepest) {
             let rise = contact.normal.dot(normal);
-            let bar = friction * friction / (1.0 + friction * friction) + STEEP;
-            steep |= rise * rise > bar * square;
+            steep |= rise * rise > steepest * square;
         }
         if steep {
             return Closure::No;
@@ -308,25 +316,53 @@ impl Plane {
                 Err(closure) => return closure,
             }
         }
-        if !self.balances(&wedges.map(|wedge| wedge.opened(1.0))) {
+        // Away from the axes of the coordinates below, where a small angle changes a ratio by
+        // little, rounding cannot change a product by as much as the margin.
+        if !self.near_axes(&wedges) {
+            match self.balances(&wedges.map(|wedge| wedge.sides), MARGIN) {
+                (true, _) => return Closure::Yes,
+                (_, false) => return Closure::No,
+                _ => {}
+            }
+        }
+        if !self.balances(&wedges.map(|wedge| wedge.opened(1.0)), 0.0).1 {
             return Closure::No;
         }
         let closed = wedges.map(|wedge| wedge.opened(-1.0));
         let proper = closed.iter().all(|[a, b]| a.perp_dot(*b) > 0.0);
-        if proper && self.balances(&closed) {
+        if proper && self.balances(&closed, 0.0).0 {
             Closure::Yes
         } else {
             Closure::Unclear
         }
     }
 
-    /// Are there strict equilibria with forces in these wedges, each given by its sides
-    /// counterclockwise?
+    /// Coordinates of forces at each contact: (t12, t13), (t23, t12), (t13, t23) are their products
+    /// across these.
     #[inline(always)]
-    fn balances(&self, wedges: &[[DVec2; 2]; 3]) -> bool {
+    fn coordinates(&self) -> [[DVec2; 2]; 3] {
         let [e12, e13, e23] = self.along;
-        // Coordinates of a force at each contact: (t12, t13), (t23, t12), (t13, t23).
-        let coordinates = [[e13, -e12], [-e12, -e23], [-e23, e13]];
+        [[e13, -e12], [-e12, -e23], [-e23, e13]]
+    }
+
+    /// Is any side of a wedge near an axis of its coordinates, or not known well?
+    #[inline(always)]
+    fn near_axes(&self, wedges: &[Wedge; 3]) -> bool {
+        let mut near = false;
+        for (wedge, [p, q]) in wedges.iter().zip(self.coordinates()) {
+            for (side, angle) in wedge.sides.into_iter().zip(wedge.angles) {
+                let (x, y) = (side.perp_dot(p).abs(), side.perp_dot(q).abs());
+                near |= (x < NEAR * y) | (y < NEAR * x) | (angle > 2.0 * ANGLE);
+            }
+        }
+        near
+    }
+
+    /// Are there strict equilibria with forces in these wedges, each given by its sides
+    /// counterclockwise, even if products of ratios are off by `margin`? And if they may be?
+    #[inline(always)]
+    fn balances(&self, wedges: &[[DVec2; 2]; 3], margin: f64) -> (bool, bool) {
+        let coordinates = self.coordinates();
         // The rays of the wedges, mirrored into the first quadrant from each of the four.
         let mut rays = [[0.0; 12]; 4];
         for contact in 0..3 {
@@ -355,15 +391,18 @@ impl Plane {
             }
         }
         let [low_x, low_y, high_x, high_y] = products;
-        let mut closed = 0u32;
+        let (mut surely, mut maybe) = (0u32, 0u32);
         for octant in 0..8 {
-            let (below, above) = (
-                low_y[octant] < low_x[octant],
-                high_y[octant] > high_x[octant],
+            let (low, high) = (low_y[octant], high_x[octant]);
+            let (above_low, below_high) = (low_x[octant], high_y[octant]);
+            surely |= u32::from(
+                (low < above_low * (1.0 - margin)) & (below_high * (1.0 - margin) > high),
             );
-            closed |= u32::from(below & above);
+            maybe |= u32::from(
+                (low * (1.0 - margin) < above_low) & (below_high > high * (1.0 - margin)),
+            );
         }
-        closed != 0
+        (surely != 0, maybe != 0)
     }
 
     /// Where the boundary of a cone crosses the plane; or the answer, where it may not.

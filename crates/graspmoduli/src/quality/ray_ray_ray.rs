@@ -6,7 +6,7 @@ use super::plane::{LANES, Lanes, at};
 use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, TINY, ray};
 use glam::DVec2;
 use pulp::Simd;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 /// What the kernel's rows need, for a block of rays of contact 1 and one of contact 2; see
 /// [`Kernel::rays`] and [`Kernel::forms`]. A lane per ray.
@@ -51,8 +51,8 @@ impl Kernel {
     /// Cramer's rule gives ρ = N/D. D, N₁, N₂ are linear in (b₃, c₃) and N₃ does not depend on
     /// them, so D·x is linear in (b₃, c₃, N₃ z₃), z₃ the component of ray 3 out of the plane, and
     /// ‖D·x‖² − limit·D² is a quadratic form in what belongs to contact 3 alone. Its coefficients
-    /// are computed for all rays of contact 2 at once; its values, and the signs of ρ, for all
-    /// rays of contact 3 at once.
+    /// are computed for all rays of contact 2 at once, and so are its values and the signs of ρ with
+    /// one ray of contact 3 after the other.
     #[inline(always)]
     pub(super) fn rays<S: Simd>(
         &mut self,
@@ -82,7 +82,7 @@ impl Kernel {
         ControlFlow::Continue(())
     }
 
-    /// The rays of contacts 2 and 3 that go with one ray of contact 1.
+    /// The rays of contacts 2 and 3 that go with one ray of contact 1; a lane per ray of contact 2.
     #[inline(always)]
     fn row<S: Simd>(
         &mut self,
@@ -93,34 +93,31 @@ impl Kernel {
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let blocks = self.plane.edges.div_ceil(LANES);
         let slack = Lane::splat(simd, -SLACK);
         let minus_tiny = Lane::splat(simd, -TINY * bar);
         let n2 = splat_all(simd, &self.forms.first.n2, lane1);
-        let mut open = self.forms.rows[lane1].open;
-        while open != 0 {
-            let lane2 = open.trailing_zeros() as usize;
-            open &= open - 1;
+        for v in 0..LANES / S::F64_LANES {
+            let lanes = v * S::F64_LANES..(v + 1) * S::F64_LANES;
+            if self.forms.rows[lane1].open >> lanes.start & ((1 << S::F64_LANES) - 1) == 0 {
+                continue;
+            }
             let form = &self.forms.rows[lane1];
-            let d = splat_all(simd, &form.d, lane2);
-            let n1 = splat_all(simd, &self.forms.second.n1, lane2);
-            let n3 = Lane::splat(simd, form.n3[lane2]);
-            let q = splat_all(simd, &form.squares, lane2);
-            for block3 in 0..blocks {
-                let mut any = false;
-                for v in 0..LANES / S::F64_LANES {
-                    let [b, c, bb, bc, cc, bz, cz, zz] = load(simd, &self.third[block3], v);
-                    let det = d[0].mul_add(b, d[1] * c);
-                    let first = n1[0].mul_add(b, n1[1] * c).signed_by(det);
-                    let second = n2[0].mul_add(b, n2[1] * c).signed_by(det);
-                    let worst = first.min(second).min(n3.signed_by(det));
-                    let excess = q[0].mul_add(bb, q[1].mul_add(bc, q[2] * cc))
-                        + q[3].mul_add(bz, q[4].mul_add(cz, q[5].mul_add(zz, minus_tiny)));
-                    any |= worst.any_at_least(slack, excess);
-                }
-                if any {
-                    let at = [block1 * LANES + lane1, block2 * LANES + lane2, block3];
-                    self.offer_rays(at, tie, question, limit)?;
+            let d = load(simd, &form.d, v);
+            let n1 = load(simd, &self.forms.second.n1, v);
+            let [n3] = load(simd, std::array::from_ref(&form.n3), v);
+            let q = load(simd, &form.squares, v);
+            for j3 in 0..self.plane.edges {
+                let third = &self.third[j3 / LANES];
+                let [b, c, bb, bc, cc, bz, cz, zz] = splat_all(simd, third, j3 % LANES);
+                let det = d[0].mul_add(b, d[1] * c);
+                let first = n1[0].mul_add(b, n1[1] * c).signed_by(det);
+                let second = n2[0].mul_add(b, n2[1] * c).signed_by(det);
+                let worst = first.min(second).min(n3.signed_by(det));
+                let excess = q[0].mul_add(bb, q[1].mul_add(bc, q[2] * cc))
+                    + q[3].mul_add(bz, q[4].mul_add(cz, q[5].mul_add(zz, minus_tiny)));
+                if worst.any_at_least(slack, excess) {
+                    let at = [block1 * LANES + lane1, block2, j3];
+                    self.offer_rays(at, lanes.clone(), tie, question, limit)?;
                 }
             }
         }
@@ -319,38 +316,43 @@ impl Kernel {
         }
     }
 
-    /// The same tests as in [`Kernel::row`], one ray of contact 3 after the other.
+    /// The same tests as in [`Kernel::row`], one ray of contact 2 after the other.
     #[inline(always)]
     fn offer_rays(
         &mut self,
-        [j1, j2, block3]: [usize; 3],
+        [j1, block2, j3]: [usize; 3],
+        lanes: Range<usize>,
         tie: f64,
         question: Question,
         limit: &mut f64,
     ) -> ControlFlow<()> {
-        let (lane1, lane2) = (j1 % LANES, j2 % LANES);
+        let lane1 = j1 % LANES;
         let velocity = self.plane.velocity;
         let normals = self.plane.sides.each_ref().map(|side| side.normal);
-        let (ray1, ray2) = (ray(&self.plane, 0, j1), ray(&self.plane, 1, j2));
-        let form = &self.forms.rows[lane1];
-        let d = form.d.map(|row| row[lane2]);
-        let n3 = form.n3[lane2];
-        let n1 = self.forms.second.n1.map(|row| row[lane2]);
-        let n2 = self.forms.first.n2.map(|row| row[lane1]);
-        for j3 in block3 * LANES..self.plane.edges.min((block3 + 1) * LANES) {
-            let [b, c, ..] = at(&self.third, j3);
-            let along = |row: [f64; 2]| row[0].mul_add(b, row[1] * c);
-            let (det, n1, n2) = (along(d), along(n1), along(n2));
+        let (ray1, ray3) = (ray(&self.plane, 0, j1), ray(&self.plane, 2, j3));
+        let [b, c, ..] = at(&self.third, j3);
+        let along = |row: [f64; 2]| row[0].mul_add(b, row[1] * c);
+        let n2 = along(self.forms.first.n2.map(|row| row[lane1]));
+        for lane2 in lanes {
+            let form = &self.forms.rows[lane1];
+            if form.open >> lane2 & 1 == 0 {
+                continue;
+            }
+            let det = along(form.d.map(|row| row[lane2]));
+            let n1 = along(self.forms.second.n1.map(|row| row[lane2]));
+            let n3 = form.n3[lane2];
             let sign = 1.0_f64.copysign(det);
             if det == 0.0 || [n1, n2, n3].iter().any(|n| n * sign < -SLACK) {
                 continue;
             }
+            let j2 = block2 * LANES + lane2;
+            let ray2 = ray(&self.plane, 1, j2);
             let first = normals[0] + ray1 * (n1 / det);
             let twist = velocity.twist(
                 first.to_array(),
                 normals[1].y + ray2.y * (n2 / det),
                 normals[1].z + ray2.z * (n2 / det),
-                normals[2].z + ray(&self.plane, 2, j3).z * (n3 / det),
+                normals[2].z + ray3.z * (n3 / det),
             );
             // As in the quadratic form, a vanishing determinant counts as 1e-14.
             if dot(&twist, &twist) * det * det > *limit * (1.0 - tie) * (det * det + TINY) {

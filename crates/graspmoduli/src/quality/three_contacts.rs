@@ -16,7 +16,8 @@
 //! not clear beyond rounding is left to the expanding polytope.
 
 use super::apex_ray_face::Bounds;
-use super::lanes::dot;
+use super::instructions::instructions;
+use super::lanes::{dot, greatest};
 use super::plane::{Closure, LANES, Lanes, Plane, Table, at, zeros};
 use super::r6::Twist;
 use super::ray_ray_ray::Forms;
@@ -112,7 +113,7 @@ impl Kernel {
     pub fn new(cone: &FrictionCone) -> Self {
         let plane = Plane::new(cone);
         let edges = cone.len();
-        let arch = Arch::new();
+        let arch = instructions();
         Self {
             arch,
             narrow: narrow(arch),
@@ -352,12 +353,6 @@ impl WithSimd for Ask<'_> {
 #[inline(always)]
 pub(super) fn ray(plane: &Plane, contact: usize, index: usize) -> DVec3 {
     at(&plane.sides[contact].ray, index).into()
-}
-
-/// Without the care for NaN that `f64::max` takes: one instruction.
-#[inline(always)]
-fn greatest(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 #[cfg(test)]
