@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 
-__all__: list[str]
-
 class GraspModuliError(ValueError):
     """Wrong input: names the argument, what was wanted and what came."""
 
