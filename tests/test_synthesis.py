@@ -93,7 +93,7 @@ class TestSearch:
         for rank, ranked in enumerate(best):
             if min(gaps[rank], gaps[rank + 1]) > 1e-9:
                 np.testing.assert_array_equal(ranked.grasp.u, u[index[order[rank]]])
-        placed = [gm.place(surface, ranked.grasp).quality() for ranked in best]
+        placed = [gm.quality(gm.place(surface, ranked.grasp)) for ranked in best]
         np.testing.assert_allclose(placed, wanted[wanted > 0], rtol=1e-12)
         again = gm.best_grasps(surface, u, theta, contacts=m, top=10, threads=1)
         assert again == best
