@@ -164,9 +164,7 @@ class TestGraspsAsTheyCome:
         assert frames.shape == (3, 4, 4)
         for frame, normal in zip(frames, best[0].normals, strict=True):
             np.testing.assert_allclose(frame[:3, :3], reference.rotation(normal), atol=1e-12)
-        value = gm.quality(
-            frames, center_of_mass=best[0].center_of_mass, friction=0.8, edges=6
-        )
+        value = gm.quality(frames, center_of_mass=best[0].center_of_mass, friction=0.8, edges=6)
         assert value == best[0].quality
         several = gm.contact_frames(*(np.stack([a, a]) for a in (CIRCLE, -CIRCLE)))
         assert several.shape == (2, 3, 4, 4)
@@ -248,9 +246,7 @@ class TestFriction:
         np.testing.assert_allclose([g.quality for g in found], np.sort(q)[::-1][:4], rtol=1e-12)
         for ranked in found:
             assert gm.quality(ranked) == ranked.quality
-            np.testing.assert_array_equal(
-                ranked.friction, np.where(ranked.grasp.u < 0.5, 0.3, 1.0)
-            )
+            np.testing.assert_array_equal(ranked.friction, np.where(ranked.grasp.u < 0.5, 0.3, 1.0))
 
     @pytest.mark.parametrize(
         ("friction", "sentence"),

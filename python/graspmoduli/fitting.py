@@ -227,7 +227,7 @@ class Fit(Value):
         """Reads what :meth:`save` wrote."""
         file = a_path(path)
         try:
-            with np.load(file) as data:
+            with file.open("rb") as handle, np.load(handle) as data:
                 version = int(data["graspmoduli_fit"])
                 if version == FILE_VERSION:
                     bottom, top = data["heights"].tolist()
