@@ -188,6 +188,13 @@ def cells(allowed: ArrayLike | None) -> NDArray[np.bool_] | None:
     return grid
 
 
+def a_callback(name: str, value: Any) -> Any:
+    """``value`` if it can be called, or None."""
+    if value is not None and not callable(value):
+        raise GraspModuliError(f"{name} must be a function, got {brief(value)}")
+    return value
+
+
 def a_path(value: Any) -> Path:
     """The path of a file."""
     try:

@@ -17,6 +17,7 @@ from ._arrays import (
     edges_of,
     finite,
     floats,
+    locked,
     number,
     unit,
     vectors,
@@ -103,22 +104,24 @@ def batch(
     m = points.shape[-2]
     if m == 0:
         raise GraspModuliError(f"contacts must be at least one per grasp, got {points.shape}")
-    mu = frictions_of(friction, m)
-    scale = np.array(1.0) if length_scale is None else floats("length_scale", length_scale)
-    if (scale <= 0.0).any():
+    mu = ONE if friction is None else frictions_of(friction, m)
+    scale = ONE[0, ...] if length_scale is None else floats("length_scale", length_scale)
+    if length_scale is not None and (scale <= 0.0).any():
         raise GraspModuliError(f"length_scale must be positive, got {scale.min()}")
-    try:
-        shape = np.broadcast_shapes(
-            points.shape[:-2], directions.shape[:-2], center.shape[:-1], mu.shape[:-1], scale.shape
-        )
-    except ValueError:
-        raise GraspModuliError(
-            "contacts, normals and center_of_mass (and friction and length_scale) must have batch "
-            f"shapes that broadcast, got {points.shape}, {directions.shape} and {center.shape} "
-            f"(and {mu.shape} and {scale.shape})"
-        ) from None
+    shape = points.shape[:-2]
+    parts = directions.shape[:-2], center.shape[:-1], mu.shape[:-1], scale.shape
+    # One for all, of shape (), broadcasts to any.
+    if any(part and part != shape for part in parts):
+        try:
+            shape = np.broadcast_shapes(shape, *parts)
+        except ValueError:
+            raise GraspModuliError(
+                "contacts, normals and center_of_mass (and friction and length_scale) must have "
+                f"batch shapes that broadcast, got {points.shape}, {directions.shape} and "
+                f"{center.shape} (and {mu.shape} and {scale.shape})"
+            ) from None
     spin = 0.0 if torsion is None else coefficient("torsion", torsion)
-    if spin > 0.0 and scale.size and (scale != scale.flat[0]).any():
+    if spin > 0.0 and scale.ndim and scale.size and (scale != scale.flat[0]).any():
         raise GraspModuliError(
             "length_scale must be one for all grasps of soft fingers, got several"
         )
@@ -129,7 +132,7 @@ def batch(
         directions = unit("normals", finite("normals", directions))
         finite("center_of_mass", center)
     given = points, center, spin
-    if scale.ndim or scale != 1.0:
+    if length_scale is not None and (scale.ndim or scale != 1.0):
         with np.errstate(over="ignore"):
             points, center = points / scale[..., None, None], center / scale[..., None]
         spin = spin / float(scale.flat[0]) if scale.size else spin
@@ -138,7 +141,9 @@ def batch(
         _check_reach(points, center, spin)
 
     def flat(array: Floats, tail: tuple[int, ...]) -> Floats:
-        return np.ascontiguousarray(np.broadcast_to(array, shape + tail)).reshape((-1, *tail))
+        if array.shape != shape + tail:
+            array = np.ascontiguousarray(np.broadcast_to(array, shape + tail))
+        return array.reshape((-1, *tail))
 
     differ = mu.size > 1 and bool((mu != mu.flat[0]).any())
     each = flat(mu, (m,)) if differ else None
@@ -154,6 +159,7 @@ def batch(
 
 #: What a grasp is evaluated with where neither the caller nor the grasp itself says.
 FRICTION, EDGES = 1.0, 8
+ONE = locked(np.ones(1))
 
 
 def frictions_of(friction: ArrayLike | None, m: int, *, positive: bool = False) -> Floats:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Floats, a_path, brief, count, finite, floats, locked, vectors
+from ._arrays import Floats, a_callback, a_path, brief, count, finite, floats, locked, vectors
 from ._batches import carried, fingers
 from ._core import GraspModuliError
 from ._files import replacing
@@ -297,6 +297,7 @@ def fit_object(thing: Object, progress: Callable[[int, int], object] | None = No
 
 def _fitted(thing: Object, progress: Callable[[int, int], object] | None, stacklevel: int) -> Fit:
     """The fit; ``stacklevel``, from here, is that of whom warnings are for."""
+    a_callback("progress", progress)
     candidates = candidate_axes(thing)
     scored: list[tuple[float, Axis]] = []
     for done, candidate in enumerate(candidates):

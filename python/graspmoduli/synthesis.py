@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, cells, coordinates, cores, count, floats
+from ._arrays import Floats, a_callback, cells, coordinates, cores, count, floats
 from ._batches import Cone, carried, fingers, frictions_of
 from ._core import GraspModuliError
 from .grasps import Grasp, RankedGrasp, a_surface, place
@@ -80,6 +80,7 @@ def best_grasps(
     hand = fingers(each[0], edges, size)
     top = count("top", top, 1, MOST_RANKED)
     workers = cores() if threads is None else count("threads", threads, 1, MOST_THREADS)
+    a_callback("progress", progress)
     ranked = _core.best_subsets(
         np.ascontiguousarray(surface.points(us, thetas)),
         np.ascontiguousarray(surface.normals(us, thetas)),

@@ -108,7 +108,7 @@ impl Surface {
                 r.value, r.slope[0], r.slope[1], r.bend[0], r.bend[1], r.bend[2],
             ]
         });
-        table(py, rows.collect())
+        table(py, py.detach(|| rows.collect()))
     }
 
     /// Per (u, θ): point, normal, t₁, t₂, n_u, n_θ, c_uu, c_uθ, c_θθ.
@@ -132,7 +132,7 @@ impl Surface {
             }
             row
         });
-        table(py, rows.collect())
+        table(py, py.detach(|| rows.collect()))
     }
 
     /// Area, centre of mass, volume, centre of mass of the solid; by Simpson's rule if `steps`.
@@ -150,12 +150,12 @@ impl Surface {
         )
     }
 
-    fn radius_about(&self, center: [f64; 3]) -> f64 {
-        self.0.radius_about(center.into(), 64)
+    fn radius_about(&self, py: Python<'_>, center: [f64; 3]) -> f64 {
+        py.detach(|| self.0.radius_about(center.into(), 64))
     }
 
-    fn project(&self) -> Self {
-        Self(self.0.project())
+    fn project(&self, py: Python<'_>) -> Self {
+        Self(py.detach(|| self.0.project()))
     }
 }
 
