@@ -213,3 +213,44 @@ class TestBetweenRealObjects:
             fit.transfer_to(fit, grasp, "magic")
         with pytest.raises(gm.GraspModuliError, match='allowed is for method "ascent"'):
             gm.transfer(MODELS["a"], grasp, MODELS["e"], allowed=fit.allowed)
+
+
+class TestChainsAndCurves:
+    PATH = tuple((MODELS[name], gm.Grasp([0.2, 0.5, 0.8], [0.0, 2.0, 4.0])) for name in "afe")
+
+    def test_a_chain_goes_from_surface_to_surface(self):
+        (a, g), (f, _), (e, _) = self.PATH
+        options = {"method": "gradient", "surfaces": 4, "steps": 3}
+        chain = gm.transfer(a, g, [f, e], **options)
+        first = gm.transfer(a, g, f, **options)
+        last = gm.transfer(f, first.grasp, e, **options)
+        assert chain.grasp == last.grasp
+        assert chain.quality == last.quality
+        assert chain.evaluations == first.evaluations + last.evaluations
+        assert chain.t[0] == 0.0
+        assert chain.t[-1] == 2.0
+        assert (np.diff(chain.t) >= 0.0).all()
+
+    def test_a_point_is_a_surface_and_a_grasp(self):
+        (a, g), (f, _), _ = self.PATH
+        assert gm.transfer((a, g), f, "gradient", surfaces=3) == gm.transfer(
+            a, g, f, "gradient", surfaces=3
+        )
+
+    def test_a_polyline_is_its_pieces_and_a_function_the_same(self):
+        start, middle, end = self.PATH
+        found = gm.quality_along(list(self.PATH), samples=6)
+        pieces = [gm.quality_along(*pair, samples=3) for pair in ((start, middle), (middle, end))]
+        joined = np.concatenate([pieces[0].quality, pieces[1].quality[1:]])
+        np.testing.assert_allclose(found.quality, joined, atol=1e-12)
+        assert found.worst_quality == pytest.approx(
+            min(piece.worst_quality for piece in pieces), abs=1e-9
+        )
+
+        def curve(t):
+            return gm.interpolate(start, middle, t)
+
+        own = gm.quality_along(curve, samples=3)
+        np.testing.assert_allclose(own.quality, pieces[0].quality, atol=1e-8)
+        with pytest.raises(gm.GraspModuliError, match="a list of at least two points"):
+            gm.quality_along([start])
