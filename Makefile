@@ -43,12 +43,13 @@ test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwrig
 portable: $(READY) ## The same answers under every instruction set of this machine
 	$(BIN)/python tests/portable/check.py
 
-lint: $(READY) ## Formatting, clippy, ruff and types
+lint: $(READY) ## Formatting, clippy, ruff, types and the stubs of the binding
 	cargo fmt --check
 	cargo clippy --release --all-targets --quiet -- --deny warnings
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
+	$(BIN)/stubtest --allowlist crates/graspmoduli-python/stubtest-allowlist.txt graspmoduli._core
 
 format: $(READY) ## Format the sources
 	cargo fmt

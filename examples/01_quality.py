@@ -20,9 +20,11 @@ for friction in (0.3, 0.6, 1.0):
     value = gm.quality(contacts, normals, center, friction=friction)
     print(f"μ = {friction}: Q_8 = {value:.5f}")
 
-# Torques carry the unit of length: in metres the twist about the axis decides, in units of the
+# Torques carry the unit of length: in metres the twist about the axis decides, weighed by the
 # can's radius forces and torques count alike.
-print(f"lengths over the radius: Q_8 = {gm.quality(contacts / 0.03, normals, center):.5f}")
+radius = 0.03
+value = gm.quality(contacts, normals, center, length_scale=radius)
+print(f"torques over the radius: Q_8 = {value:.5f}")
 
 # A thousand graspers with shaky hands, evaluated at once.
 rng = np.random.default_rng(0)
@@ -31,21 +33,21 @@ values = gm.quality(shaky, normals, center)
 print(f"with 4 mm of error: {np.mean(values > 0):.1%} still hold, worst {values.min():.5f}")
 
 # The exact gradient says where the fingers of the worst one should move to hold better.
-worst = shaky[values.argmin()] / 0.03
-gradient = gm.quality_gradient(worst, normals, center)
-step = 0.05 * gradient.contacts / np.linalg.norm(gradient.contacts)
-print(f"the worst: Q_8 = {gradient.value:.4f}; moved by 5 % of the radius along the gradient, "
-      f"{gm.quality(worst + step, normals, center):.4f}")  # fmt: skip
+worst = shaky[values.argmin()]
+gradient = gm.quality_gradient(worst, normals, center, length_scale=radius)
+step = 0.05 * radius * gradient.contacts / np.linalg.norm(gradient.contacts)
+better = gm.quality(worst + step, normals, center, length_scale=radius)
+print(f"the worst: Q_8 = {gradient.value:.4f}; 5 % of the radius along the gradient: {better:.4f}")
 
 # How far friction carries, and how much the polygon of a cone loses against round ones.
 frictions = np.linspace(0.05, 1.5, 60)
 figure = Figure(figsize=(6.4, 3.8), dpi=120, layout="constrained")
 axes = figure.add_subplot(xlabel="friction coefficient μ", ylabel="grasp quality", xlim=(0, 1.5))
 for edges, style in ((4, ":"), (8, "-"), (32, "--")):
-    values = [gm.quality(contacts / 0.03, normals, center, friction=mu, edges=edges)
-              for mu in frictions]  # fmt: skip
+    options = {"edges": edges, "length_scale": radius}
+    values = [gm.quality(contacts, normals, center, friction=mu, **options) for mu in frictions]
     axes.plot(frictions, values, style, label=f"{edges} cone edges")
-axes.set_title("three fingers around a can, lengths over its radius")
+axes.set_title("three fingers around a can, torques over its radius")
 axes.legend(frameon=False)
 picture = Path(sys.argv[1] if len(sys.argv) > 1 else "out/quality.png")
 picture.parent.mkdir(exist_ok=True, parents=True)

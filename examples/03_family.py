@@ -18,7 +18,7 @@ print(f"best grasp of the bottle: Q = {best.quality:.4f}, u = {best.grasp.u.roun
 # The surfaces (1 − t) bottle + t vase are exact in the splines' coefficients.
 for t in np.linspace(0.0, 1.0, 6):
     shape = gm.combine([bottle, vase], [1 - t, t])
-    carried = gm.place(shape, best.grasp).quality()
+    carried = gm.quality(gm.place(shape, best.grasp))
     own = gm.synthesize(shape, top=1)[0].quality
     print(f"t = {t:.1f}: carried along Q = {carried:.4f}, best of its own Q = {own:.4f}")
 

@@ -18,7 +18,7 @@ best = source.synthesize(top=1)[0]
 print(f"best grasp of the source: Q = {best.quality:.4f}")
 
 # Surfaces of a size, so that shapes are compared and not sizes.
-start, end = ((1 / fit.length_scale) * fit.surface for fit in (source, target))
+start, end = source.unit_surface, target.unit_surface
 apart = gm.surface_distance(start, end)
 promise = gm.certify_transfer(start, best.grasp, end)
 print(f"d(S, T) = {apart:.3f}; contacts and normals move by at most {promise.distance:.3f},")

@@ -19,7 +19,7 @@ print(f"Q = {best.quality:.4f}; whatever moves by less than {radius:.4f} keeps i
 
 # Contacts and normals that slip by so much: at random, and where the gradient says it hurts most.
 rng = np.random.default_rng(0)
-slope = gm.quality_gradient(placed.contacts, placed.normals, placed.center_of_mass)
+slope = gm.quality_gradient(placed)
 downhill = -slope.contacts / np.linalg.norm(slope.contacts, axis=1, keepdims=True)
 tilt = -slope.normals / np.linalg.norm(slope.normals, axis=1, keepdims=True)
 

@@ -130,8 +130,8 @@ class TestWorstNeighbours:
             gm.PlacedGrasp(*(part[0] for part in split(row[None])))
             for row in (found.grasp, found.neighbour)
         )
-        assert grasp.quality() >= delta
-        assert near.quality() == found.smallest
+        assert gm.quality(grasp) >= delta
+        assert gm.quality(near) == found.smallest
         assert gm.placed_distance(grasp, near) <= epsilon
         points = np.vstack([grasp.contacts, grasp.center_of_mass])
         assert (np.linalg.norm(points, axis=1) <= 1.0 + 1e-12).all()

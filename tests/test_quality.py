@@ -465,3 +465,16 @@ class TestWrongInput:
             gm.quality(*arguments, **options)
         assert "\n" not in str(caught.value)
         assert isinstance(caught.value, ValueError)
+
+
+def test_soft_fingers_can_what_hard_ones_cannot():
+    # Four coincident ones without friction, three collinear ones; three without friction cannot.
+    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]) / np.sqrt(3)
+    options = {"friction": 0.0, "torsion": 1.0}
+    assert gm.quality(np.zeros((4, 3)), tetrahedron, ORIGIN, **options) > 0.3
+    for m in (1, 2, 3):
+        assert gm.quality(np.zeros((m, 3)), tetrahedron[:m], ORIGIN, **options) == 0.0
+    line = np.array([[1.0, 0, 0], [-1, 0, 0], [0.5, 0, 0]])
+    normals = np.array([[-1.0, 0, 0], [1, 0, 0], [-1, 0, 0]])
+    assert gm.quality(line, normals, ORIGIN) == 0.0
+    assert gm.quality(line, normals, ORIGIN, torsion=0.2) > 0.0

@@ -469,7 +469,7 @@ class TestGraspGradient:
 
             def at(step, u=u, theta=theta, du=du, dtheta=dtheta):
                 moved = gm.Grasp(u + step * du, theta + step * dtheta)
-                return gm.place(surface, moved).quality(friction=0.8)
+                return gm.quality(gm.place(surface, moved), friction=0.8)
 
             if abs(at(h) + at(-h) - 2 * slope.value) > 1e-9:
                 continue

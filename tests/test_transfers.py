@@ -35,10 +35,10 @@ class TestQualityAlong:
         for end in ends.values():
             found = gm.quality_along(start, end, samples=40, edges=6)
             fine = np.linspace(0.0, 1.0, 401)
-            slow = [gm.place(*gm.interpolate(start, end, x)).quality(edges=6) for x in fine]
+            slow = [gm.quality(gm.place(*gm.interpolate(start, end, x)), edges=6) for x in fine]
             np.testing.assert_allclose(found.quality, slow[::10], atol=1e-8)
             assert found.worst_quality <= min(slow) + 1e-8
-            at = gm.place(*gm.interpolate(start, end, found.worst_t)).quality(edges=6)
+            at = gm.quality(gm.place(*gm.interpolate(start, end, found.worst_t)), edges=6)
             assert at == pytest.approx(found.worst_quality, abs=1e-8)
             assert found.status == ("force closure" if found.worst_quality > 0 else "lost")
 
@@ -57,7 +57,7 @@ class TestQualityAlong:
         point = MODELS["f"], grasps["f"]
         found = gm.quality_along(point, point, samples=3)
         assert np.ptp(found.quality) <= 1e-14
-        assert found.worst_quality == pytest.approx(gm.place(*point).quality(), abs=1e-14)
+        assert found.worst_quality == pytest.approx(gm.quality(gm.place(*point)), abs=1e-14)
 
     def test_wrong_input(self, grasps):
         start = MODELS["f"], grasps["f"]
@@ -74,14 +74,14 @@ class TestTransfer:
         found = gm.transfer(MODELS["e"], grasps["e"], MODELS["k"])
         assert found.grasp == grasps["e"]
         placed = gm.place(MODELS["k"], grasps["e"])
-        assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
-        start = gm.place(MODELS["e"], grasps["e"]).quality()
+        assert found.quality == pytest.approx(gm.quality(placed), abs=1e-10)
+        start = gm.quality(gm.place(MODELS["e"], grasps["e"]))
         assert found.path[0] == pytest.approx(start, abs=1e-12)
         assert found.path[-1] == found.quality
         assert len(found.path) == len(found.t) == 101
         half = gm.place(gm.combine([MODELS["e"], MODELS["k"]], [0.5, 0.5]), grasps["e"])
         # The centre of mass on the way is by Simpson's rule.
-        assert found.path[50] == pytest.approx(half.quality(), abs=1e-3)
+        assert found.path[50] == pytest.approx(gm.quality(half), abs=1e-3)
 
     @pytest.mark.parametrize("method", ["gradient", "ascent"])
     def test_quality_is_that_of_the_grasp_and_u_stays_on_the_surface(self, grasps, method):
@@ -89,7 +89,7 @@ class TestTransfer:
             for target in "efg":
                 found = gm.transfer(MODELS[source], grasps[source], MODELS[target], method)
                 placed = gm.place(MODELS[target], found.grasp)
-                assert found.quality == pytest.approx(placed.quality(), abs=1e-10)
+                assert found.quality == pytest.approx(gm.quality(placed), abs=1e-10)
                 assert found.status == "force closure"
                 assert (found.grasp.u >= 0).all()
                 assert (found.grasp.u <= 1).all()
@@ -118,7 +118,7 @@ class TestTransfer:
         assert exact.evaluations == 100 + 21
 
     def test_on_one_surface_it_is_an_ascent(self, grasps):
-        start = gm.place(MODELS["g"], grasps["g"]).quality()
+        start = gm.quality(gm.place(MODELS["g"], grasps["g"]))
         for method in ("gradient", "ascent"):
             assert gm.transfer(MODELS["g"], grasps["g"], MODELS["g"], method).quality >= start
 
@@ -213,3 +213,44 @@ class TestBetweenRealObjects:
             fit.transfer_to(fit, grasp, "magic")
         with pytest.raises(gm.GraspModuliError, match='allowed is for method "ascent"'):
             gm.transfer(MODELS["a"], grasp, MODELS["e"], allowed=fit.allowed)
+
+
+class TestChainsAndCurves:
+    PATH = tuple((MODELS[name], gm.Grasp([0.2, 0.5, 0.8], [0.0, 2.0, 4.0])) for name in "afe")
+
+    def test_a_chain_goes_from_surface_to_surface(self):
+        (a, g), (f, _), (e, _) = self.PATH
+        options = {"method": "gradient", "surfaces": 4, "steps": 3}
+        chain = gm.transfer(a, g, [f, e], **options)
+        first = gm.transfer(a, g, f, **options)
+        last = gm.transfer(f, first.grasp, e, **options)
+        assert chain.grasp == last.grasp
+        assert chain.quality == last.quality
+        assert chain.evaluations == first.evaluations + last.evaluations
+        assert chain.t[0] == 0.0
+        assert chain.t[-1] == 2.0
+        assert (np.diff(chain.t) >= 0.0).all()
+
+    def test_a_point_is_a_surface_and_a_grasp(self):
+        (a, g), (f, _), _ = self.PATH
+        assert gm.transfer((a, g), f, "gradient", surfaces=3) == gm.transfer(
+            a, g, f, "gradient", surfaces=3
+        )
+
+    def test_a_polyline_is_its_pieces_and_a_function_the_same(self):
+        start, middle, end = self.PATH
+        found = gm.quality_along(list(self.PATH), samples=6)
+        pieces = [gm.quality_along(*pair, samples=3) for pair in ((start, middle), (middle, end))]
+        joined = np.concatenate([pieces[0].quality, pieces[1].quality[1:]])
+        np.testing.assert_allclose(found.quality, joined, atol=1e-12)
+        assert found.worst_quality == pytest.approx(
+            min(piece.worst_quality for piece in pieces), abs=1e-9
+        )
+
+        def curve(t):
+            return gm.interpolate(start, middle, t)
+
+        own = gm.quality_along(curve, samples=3)
+        np.testing.assert_allclose(own.quality, pieces[0].quality, atol=1e-8)
+        with pytest.raises(gm.GraspModuliError, match="a list of at least two points"):
+            gm.quality_along([start])

@@ -96,14 +96,151 @@ def test_numbers_for_comparison():
     # Three unit levers at 120°: Σ [1, r×; …] has eigenvalues 3/2 and 3.
     assert space.smallest_singular_value == pytest.approx(np.sqrt(1.5))
     assert gm.WrenchSpace(SQUEEZE, SQUEEZE_NORMALS, ORIGIN).smallest_singular_value < 1e-12
-    assert gm.WrenchSpace([[1, 0, 0]], [[-1, 0, 0]], ORIGIN).volume < 1e-9
+    assert gm.WrenchSpace([[1, 0, 0]], [[-1, 0, 0]], ORIGIN).volume == 0.0
     assert repr(space) == "WrenchSpace(3 contacts, Q_8 = 0.544232)"
 
 
 def test_wrong_input():
-    with pytest.raises(gm.GraspModuliError, match="one grasp, got"):
+    with pytest.raises(gm.GraspModuliError, match="one grasp, of shape"):
         gm.WrenchSpace([CIRCLE], [-CIRCLE], ORIGIN)
     with pytest.raises(gm.GraspModuliError, match="wrench must have shape"):
         gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN).resist([1, 0, 0])
     with pytest.raises(gm.GraspModuliError, match="friction must be"):
         gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN, friction=-1)
+
+
+NEARLY_COLLINEAR = [[-1, 0, 0], [1, 0, 0], [0, 1e-9, 0]], [[1, 0, 0], [-1, 0, 0], [0, -1, 0]]
+
+
+class TestResist:
+    @pytest.mark.parametrize("size", [1e-6, 1e-3, 3e4, 1e5, 1e7, 1e30])
+    def test_forces_balance_torques_at_any_lever_arm(self, size):
+        space = gm.WrenchSpace(size * CIRCLE, -CIRCLE, ORIGIN)
+        for load in np.eye(6):
+            held = space.resist(load)
+            assert held.forces is not None
+            total = np.hstack(
+                [held.forces.sum(0), np.cross(space.contacts, held.forces).sum(0)]
+            ) / [1, 1, 1, size, size, size]
+            wanted = -load / [1, 1, 1, size, size, size]
+            error = np.linalg.norm(total - wanted)
+            assert error <= 1e-14 * max(np.linalg.norm(wanted), np.linalg.norm(held.forces))
+
+    def test_the_sum_is_the_least(self):
+        from scipy.optimize import linprog
+
+        rng = np.random.default_rng(54)
+        for contacts, normals, center in zip(*uniform_grasps(60, rng, 4), strict=True):
+            space = gm.WrenchSpace(contacts, normals, center, edges=5)
+            load = rng.normal(size=6)
+            plain = linprog(np.ones(20), A_eq=space.wrenches.T, b_eq=-load)
+            held = space.resist(load)
+            assert plain.success == (held.proof is None)
+            if plain.success:
+                assert held.normal_force == pytest.approx(plain.fun, rel=1e-6)
+
+    def test_what_is_called_force_closure_resists_everything(self):
+        space = gm.WrenchSpace(*NEARLY_COLLINEAR, ORIGIN)
+        assert space.status == "force closure"
+        for load in (*np.eye(6), *-np.eye(6), space.weakest):
+            held = space.resist(load)
+            assert held.proof is None
+            assert held.normal_force <= 1.0 / space.quality * (1 + 1e-6)
+
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+    def test_proofs_are_proofs(self, case):
+        space = gm.WrenchSpace(case.contacts, case.normals, case.center, friction=case.friction)
+        rng = np.random.default_rng(55)
+        units = np.array([1, 1, 1, case.size, case.size, case.size])
+        for load in rng.normal(size=(20, 6)) * units:
+            found = space.resist(load)
+            if space.quality > 0.0:
+                assert found.proof is None
+            if found.proof is None:
+                continue
+            proof = found.proof * units
+            proof /= np.linalg.norm(proof)
+            assert proof @ (load / units) > 1e-10
+            assert (space.wrenches / units @ proof).min() >= -1e-12
+
+    def test_huge_and_tiny_loads_are_scaled(self):
+        space = gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN)
+        one = space.resist([0.3, 0.1, -1.0, 0.2, 0.0, 0.1])
+        for size in (1e140, 1e-200):
+            held = space.resist(size * np.array([0.3, 0.1, -1.0, 0.2, 0.0, 0.1]))
+            assert held.normal_force == pytest.approx(size * one.normal_force, rel=1e-9)
+        assert space.resist(np.zeros(6)).normal_force == 0.0
+        with pytest.raises(gm.GraspModuliError, match="wrench must be at most 1e\\+150, got 1e"):
+            space.resist([1e300, 0, 0, 0, 0, 0])
+
+
+class TestHalfSpaces:
+    @pytest.mark.parametrize("m", [2, 3, 5])
+    def test_are_those_of_the_hull(self, m):
+        from scipy.spatial import ConvexHull
+
+        rng = np.random.default_rng(56)
+        for contacts, normals, center in zip(*uniform_grasps(12, rng, m), strict=True):
+            space = gm.WrenchSpace(contacts, normals, center, edges=6, torsion=0.2)
+            facets = space.facets
+            np.testing.assert_allclose(np.linalg.norm(facets.normals, axis=1), 1.0)
+            heights = space.wrenches @ facets.normals.T
+            assert (heights <= facets.offsets + 1e-14).all()
+            # Six wrenches at least on each, and no two facets are the same.
+            assert ((heights > facets.offsets - 1e-9).sum(0) >= 6).all()
+            rounded = {tuple(row) for row in facets.normals.round(7).tolist()}
+            assert len(rounded) == len(facets.offsets)
+            planes = ConvexHull(space.wrenches, qhull_options="Qt").equations
+            theirs = {tuple(row) for row in planes[:, :-1].round(5).tolist()}
+            assert len(theirs) >= len(facets.offsets)
+            if space.quality > 0.0:
+                assert facets.offsets.min() == pytest.approx(space.quality, rel=1e-9)
+            # A wrench is in S exactly if it is a convex combination of the corners.
+            inside = rng.dirichlet(np.ones(len(space.wrenches)), 50) @ space.wrenches
+            assert (inside @ facets.normals.T <= facets.offsets + 1e-12).all()
+            assert planes[:, -1].max() == pytest.approx(-facets.offsets.min(), abs=1e-9)
+
+    def test_many_wrenches_of_one_facet_make_one_half_space(self):
+        # Four fingers in a square: facets of many points.
+        square = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+        space = gm.WrenchSpace(square, -square, ORIGIN, edges=4)
+        facets = space.facets
+        apart = np.linalg.norm(facets.normals[:, None] - facets.normals, axis=-1)
+        assert apart[~np.eye(len(apart), dtype=bool)].min() > 1e-6
+        assert facets.offsets.min() == pytest.approx(space.quality, rel=1e-12)
+
+    def test_a_flat_hull_lies_between_two(self):
+        space = gm.WrenchSpace(SQUEEZE, SQUEEZE_NORMALS, ORIGIN)
+        assert space.quality == 0.0
+        facets = space.facets
+        # No torque about the line: ±e₄ with offset 0.
+        across = np.abs(facets.normals[:, 3]) > 1 - 1e-12
+        assert across.sum() == 2
+        np.testing.assert_allclose(facets.offsets[across], 0.0, atol=1e-15)
+        assert (space.wrenches @ facets.normals.T <= facets.offsets + 1e-14).all()
+        outside = np.array([0, 0, 0, 0.1, 0, 0])
+        assert (outside @ facets.normals.T > facets.offsets + 0.05).any()
+
+
+class TestFlat:
+    @pytest.mark.parametrize("size", [1e-6, 1.0, 1e3, 1e50])
+    def test_the_volume_is_exactly_0_where_the_hull_is_flat(self, size):
+        line = [[1, 0, 0], [-1, 0, 0], [0.3, 0, 0]]
+        for contacts, normals in (
+            (CIRCLE[:1], -CIRCLE[:1]),
+            (CIRCLE[:2], -CIRCLE[:2]),
+            (line, [[-1, 0, 0], [1, 0, 0], [0, 0.6, 0.8]]),
+            ([[1, 1, 1]] * 3, [[-1, 0, 0], [1, 0, 0], [0, 0, 1]]),
+        ):
+            space = gm.WrenchSpace(size * np.array(contacts), normals, ORIGIN)
+            assert space.volume == 0.0
+            assert space.quality == 0.0
+            assert space.smallest_singular_value < 1e-10
+        assert gm.WrenchSpace(size * CIRCLE, -CIRCLE, ORIGIN).volume > 0.0
+
+    def test_the_smallest_singular_value_at_any_lever_arm(self):
+        # Σ [1, r×; …] has eigenvalues 3 and 3/2 r² here.
+        for size in (1e-50, 1e-3, 1.0, 1e3, 1e50):
+            space = gm.WrenchSpace(size * CIRCLE, -CIRCLE, ORIGIN)
+            wanted = np.sqrt(min(3.0, 1.5 * size**2))
+            assert space.smallest_singular_value == pytest.approx(wanted, rel=1e-12)

@@ -3,7 +3,8 @@
 =====================  ======================================================================
 grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
-one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench
+one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench;
+                       :func:`contact_frames`
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
 grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:`distance`,
@@ -14,7 +15,7 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`
-errors                 :class:`GraspModuliError`
+errors                 :class:`GraspModuliError`, :class:`MissingExtraError`
 =====================  ======================================================================
 
 The mathematics is that of F. T. Pokorny, K. Hang, D. Kragic, *Grasp Moduli Spaces*, RSS 2013.
@@ -23,7 +24,10 @@ object, normals point into it.
 """
 
 from . import shapes as shapes
+from ._batches import GraspLike as GraspLike
+from ._batches import contact_frames as contact_frames
 from ._core import GraspModuliError as GraspModuliError
+from ._extras import MissingExtraError as MissingExtraError
 from .fitting import Fit as Fit
 from .fitting import ObjectGrasp as ObjectGrasp
 from .fitting import Residual as Residual
@@ -66,5 +70,6 @@ from .transfers import QualityAlong as QualityAlong
 from .transfers import Transfer as Transfer
 from .transfers import quality_along as quality_along
 from .transfers import transfer as transfer
+from .wrench_space import HalfSpaces as HalfSpaces
 from .wrench_space import Resistance as Resistance
 from .wrench_space import WrenchSpace as WrenchSpace

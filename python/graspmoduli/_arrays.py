@@ -5,33 +5,53 @@ from __future__ import annotations
 import math
 import operator
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
 from ._core import GraspModuliError
 
 Floats = NDArray[np.float64]
 
 #: How far the length of a unit normal may be from 1; it is normalised to rounding.
 UNIT_TOLERANCE = 1e-4
+#: More edges of a friction cone than this are refused: a circle to 1e-9.
+MOST_EDGES = 2**16
+#: Larger friction coefficients are refused: the kernels would lose them to rounding.
+MOST_FRICTION = 1e6
 
 
-def floats(name: str, value: ArrayLike) -> Floats:
+def floats(name: str, value: Any) -> Floats:
     """``value`` as a contiguous float64 array of finite numbers."""
     return finite(name, numbers(name, value))
 
 
-def numbers(name: str, value: ArrayLike) -> Floats:
-    """``value`` as a contiguous float64 array."""
+def numbers(name: str, value: Any) -> Floats:
+    """``value`` as a contiguous float64 array; the very same one if it is that already."""
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        array = value
+    else:
+        array = _converted(value)
+        if array is None:
+            raise GraspModuliError(f"{name} must be an array of numbers, got {brief(value)}")
+        if np.ma.is_masked(value):
+            raise GraspModuliError(f"{name} must be without masked elements, got {brief(value)}")
+    return array if array.flags.c_contiguous else np.ascontiguousarray(array)
+
+
+def _converted(value: Any) -> Floats | None:
+    """``value`` as a float64 array, or None if it is not made of real numbers."""
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise GraspModuliError(f"{name} must be an array of numbers, got {_brief(value)}") from None
-    # ascontiguousarray makes a 0-d array 1-d.
-    return array.reshape(np.shape(value))
+        array = np.asarray(value)
+        # NumPy takes None for NaN, reads numbers from text and drops imaginary parts.
+        if array.dtype.kind == "O" and not all(hasattr(x, "__float__") for x in array.flat):
+            return None
+        return array.astype(np.float64, copy=False) if array.dtype.kind in "biufO" else None
+    # What an object of somebody else's raises when it is asked for an array is its own choice.
+    except Exception:
+        return None
 
 
 def finite(name: str, array: Floats) -> Floats:
@@ -43,7 +63,7 @@ def finite(name: str, array: Floats) -> Floats:
     return array
 
 
-def vectors(name: str, value: ArrayLike, shape: str) -> Floats:
+def vectors(name: str, value: Any, shape: str) -> Floats:
     """An array with at least as many axes as ``shape`` names, the last of length 3."""
     array = numbers(name, value)
     if array.ndim < shape.count(",") or array.shape[-1] != 3:
@@ -67,41 +87,7 @@ def unit(name: str, array: Floats) -> Floats:
     return np.where(exact[..., None], array, array / lengths[..., None])
 
 
-def grasps(
-    contacts: ArrayLike, normals: ArrayLike, center_of_mass: ArrayLike
-) -> tuple[Floats, Floats, Floats, tuple[int, ...]]:
-    """Grasps as (n, m, 3), (n, m, 3), (n, 3), and the shape of the batch."""
-    points = vectors("contacts", contacts, "(..., m, 3)")
-    directions = vectors("normals", normals, "(..., m, 3)")
-    center = vectors("center_of_mass", center_of_mass, "(..., 3)")
-    if points.shape[-2] != directions.shape[-2]:
-        raise GraspModuliError(
-            f"normals must be as many per grasp as contacts, "
-            f"got {directions.shape} and {points.shape}"
-        )
-    if points.shape[-2] == 0:
-        raise GraspModuliError(f"contacts must be at least one per grasp, got {points.shape}")
-    try:
-        batch = np.broadcast_shapes(points.shape[:-2], directions.shape[:-2], center.shape[:-1])
-    except ValueError:
-        raise GraspModuliError(
-            "contacts, normals and center_of_mass must have batch shapes that broadcast, "
-            f"got {points.shape}, {directions.shape} and {center.shape}"
-        ) from None
-    # One quick look at all of it; what it does not like is looked at with care.
-    if not _core.is_clean(points, directions, center):
-        finite("contacts", points)
-        directions = unit("normals", finite("normals", directions))
-        finite("center_of_mass", center)
-    m = points.shape[-2]
-
-    def flat(array: Floats, tail: tuple[int, ...]) -> Floats:
-        return np.ascontiguousarray(np.broadcast_to(array, batch + tail)).reshape((-1, *tail))
-
-    return flat(points, (m, 3)), flat(directions, (m, 3)), flat(center, (3,)), batch
-
-
-def coordinates(u: ArrayLike, theta: ArrayLike) -> tuple[Floats, Floats, tuple[int, ...]]:
+def coordinates(u: Any, theta: Any) -> tuple[Floats, Floats, tuple[int, ...]]:
     """(u, θ) as flat arrays of equal length, and their common shape."""
     us, thetas = floats("u", u), floats("theta", theta)
     if ((us < 0.0) | (us > 1.0)).any():
@@ -124,30 +110,42 @@ def number(name: str, value: Any, *, positive: bool = False) -> float:
     """A finite number."""
     wanted = "a positive finite number" if positive else "a finite number"
     try:
+        if isinstance(value, str | bytes | complex) or getattr(value, "ndim", 0):
+            raise TypeError
         result = float(value)
-    except (TypeError, ValueError):
-        raise GraspModuliError(f"{name} must be {wanted}, got {_brief(value)}") from None
+    except Exception:
+        raise GraspModuliError(f"{name} must be {wanted}, got {brief(value)}") from None
     if not math.isfinite(result) or (positive and result <= 0.0):
         raise GraspModuliError(f"{name} must be {wanted}, got {result}")
     return result
 
 
-def count(name: str, value: Any, least: int) -> int:
-    """A whole number of at least ``least``."""
+def count(name: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
+    """A whole number from ``least`` to ``most``."""
     try:
         result = operator.index(value)
-    except TypeError:
+    except Exception:
         raise GraspModuliError(
-            f"{name} must be a whole number of at least {least}, got {_brief(value)}"
+            f"{name} must be a whole number of at least {least}, got {brief(value)}"
         ) from None
     if result < least:
-        raise GraspModuliError(f"{name} must be at least {least}, got {result}")
+        raise GraspModuliError(f"{name} must be at least {least}, got {brief(result)}")
+    if result > most:
+        raise GraspModuliError(f"{name} must be at most {most}, got {brief(result)}")
     return result
 
 
+def edges_of(edges: Any) -> int:
+    """Number l of edges of a friction cone."""
+    return count("edges", edges, 3, MOST_EDGES)
+
+
 def cone(friction: Any, edges: Any) -> tuple[float, int]:
-    """Friction coefficient μ > 0 and number of edges l ≥ 3."""
-    return number("friction", friction, positive=True), count("edges", edges, 3)
+    """Friction coefficient μ > 0, one for all contacts, and number of edges l ≥ 3."""
+    mu = number("friction", friction, positive=True)
+    if mu > MOST_FRICTION:
+        raise GraspModuliError(f"friction must be at most {MOST_FRICTION:g}, got {mu}")
+    return mu, edges_of(edges)
 
 
 def coefficient(name: str, value: Any) -> float:
@@ -164,8 +162,13 @@ def locked(array: Floats) -> Floats:
     return array
 
 
-def _brief(value: Any) -> str:
-    text = repr(value).replace("\n", " ")
+def brief(value: Any) -> str:
+    """``value`` as errors show it, in at most 60 characters."""
+    try:
+        text = repr(value).replace("\n", " ")
+    except Exception:
+        # Whole numbers of thousands of digits, and objects that cannot say what they are.
+        text = f"one that cannot be shown, of type {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -173,10 +176,34 @@ def cells(allowed: ArrayLike | None) -> NDArray[np.bool_] | None:
     """Where contacts may lie: booleans of shape (rows, columns), or everywhere."""
     if allowed is None:
         return None
-    grid = np.ascontiguousarray(allowed, dtype=np.bool_)
+    try:
+        grid = np.asarray(allowed)
+    except Exception:
+        grid = np.zeros(0)
+    if grid.dtype.kind not in "biu":
+        raise GraspModuliError(f"allowed must be an array of booleans, got {brief(allowed)}")
+    grid = np.ascontiguousarray(grid, dtype=np.bool_)
     if grid.ndim != 2 or not grid.size:
         raise GraspModuliError(f"allowed must have shape (rows, columns), got {grid.shape}")
     return grid
+
+
+def a_callback(name: str, value: Any) -> Any:
+    """``value`` if it can be called, or None."""
+    if value is not None and not callable(value):
+        raise GraspModuliError(f"{name} must be a function, got {brief(value)}")
+    return value
+
+
+def a_path(value: Any) -> Path:
+    """The path of a file."""
+    try:
+        path = Path(value)
+    except TypeError:
+        raise GraspModuliError(f"path must be the path of a file, got {brief(value)}") from None
+    if "\0" in str(path) or not path.name:
+        raise GraspModuliError(f"path must be the path of a file, got {brief(value)}")
+    return path
 
 
 def cores() -> int:

@@ -7,17 +7,22 @@ regression is that of penalised splines (Eilers & Marx 1996) with robust weights
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ._arrays import Floats, count, locked
+from ._arrays import Floats, a_callback, a_path, brief, count, finite, floats, locked, vectors
+from ._batches import carried, fingers
 from ._core import GraspModuliError
+from ._files import replacing
+from ._values import Value
 from .axes import candidate_axes, refined, same_axis, score
-from .grasps import Grasp
+from .grasps import Grasp, PlacedGrasp, RankedGrasp, a_grasp
 from .quality import quality
 from .reading import Object, read
 from .surfaces import Surface
@@ -25,6 +30,8 @@ from .synthesis import synthesize
 from .transfers import transfer
 from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
 
+#: The version of the files that Fit.save writes.
+FILE_VERSION = 1
 #: More unexplained than this is refused.
 MOST_UNEXPLAINED = 0.4
 #: Axes whose scores, numbers of order 1, are this close are equally good.
@@ -56,25 +63,18 @@ class Residual:
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectGrasp:
-    """A grasp in the coordinates of a real object."""
+class ObjectGrasp(RankedGrasp):
+    """A grasp in the coordinates of a real object.
 
-    #: Contact coordinates on the fitted surface.
-    grasp: Grasp
-    #: Q_l of what follows, with lengths divided by ``length_scale``.
-    quality: float
-    #: Contact points, in the unit of the object. Shape (m, 3).
-    contacts: Floats
-    #: Unit normals pointing into the object. Shape (m, 3).
-    normals: Floats
-    #: Centre of mass of the fitted surface. Shape (3,).
-    center_of_mass: Floats
-    #: The object's radius about its centre of mass.
-    length_scale: float
+    Contacts, normals and centre of mass are in the object's coordinates and unit, ``surface`` is
+    the fitted one in its own, and the quality is that of torques divided by ``length_scale``, the
+    object's radius about its centre of mass. ``gm.quality(best)`` is ``best.quality``, and
+    ``best.wrench_space()`` tells which forces hold against which disturbances.
+    """
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Value):
     """A surface fitted to an object."""
 
     #: The surface, about its own axis, in the unit of the object.
@@ -91,24 +91,28 @@ class Fit:
 
     @property
     def length_scale(self) -> float:
-        """The surface's radius about its centre of mass: lengths are divided by it for Q_l."""
+        """The surface's radius about its centre of mass: torques are divided by it for Q_l."""
         return self.surface.radius_about(self.surface.center_of_mass)
 
+    @property
+    def unit_surface(self) -> Surface:
+        """The surface divided by :attr:`length_scale`: to compare shapes and not sizes."""
+        return (1.0 / self.length_scale) * self.surface
+
     def synthesize(
-        self, *, top: int = 5, friction: float = 1.0, edges: int = 8, seed: int = 0
+        self, *, top: int = 5, friction: ArrayLike = 1.0, edges: int = 8, seed: int = 0
     ) -> list[ObjectGrasp]:
         """Different grasps of high quality in the object's own coordinates, best first.
 
         :func:`graspmoduli.synthesize` on the fitted surface, with contacts only where the object
-        is explained by it or was not seen. Lengths are divided by :attr:`length_scale` for the
+        is explained by it or was not seen. Torques are divided by :attr:`length_scale` for the
         quality, which therefore does not depend on the object's unit.
         """
-        scale = self.length_scale
         # Where contacts are not allowed everywhere, more starts find better grasps.
         found = synthesize(
-            (1.0 / scale) * self.surface,
+            self.unit_surface,
             top=top,
-            starts=2 * count("top", top, 1) + 6,
+            starts=2 * count("top", top, 1, 1_000) + 6,
             friction=friction,
             edges=edges,
             seed=seed,
@@ -119,14 +123,15 @@ class Fit:
         grasps = [self.in_object(ranked.grasp, friction=friction, edges=edges) for ranked in found]
         return sorted((g for g in grasps if g.quality > 0.0), key=lambda grasp: -grasp.quality)
 
-    def in_object(self, grasp: Grasp, *, friction: float = 1.0, edges: int = 8) -> ObjectGrasp:
+    def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""
+        a_grasp("grasp", grasp)
         contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
         normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
         return self._object_grasp(grasp, contacts, normals, friction, edges)
 
     def on_mesh(
-        self, mesh: Any, grasp: Grasp, *, friction: float = 1.0, edges: int = 8
+        self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
     ) -> ObjectGrasp:
         """A grasp as the object's own mesh sees it, not the fitted surface.
 
@@ -167,7 +172,7 @@ class Fit:
         grasp: Grasp,
         method: str = "ascent",
         *,
-        friction: float = 1.0,
+        friction: ArrayLike = 1.0,
         edges: int = 8,
     ) -> ObjectGrasp:
         """A grasp of this object carried to another one, in that one's own coordinates.
@@ -176,7 +181,9 @@ class Fit:
         :attr:`length_scale`; the ascent offers contacts only where the target is explained by its
         surface or was not seen.
         """
-        start, end = ((1.0 / fit.length_scale) * fit.surface for fit in (self, target))
+        if not isinstance(target, Fit):
+            raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
+        start, end = self.unit_surface, target.unit_surface
         allowed = target.allowed if method == "ascent" else None
         carried = transfer(
             start, grasp, end, method, friction=friction, edges=edges, allowed=allowed
@@ -184,20 +191,77 @@ class Fit:
         return target.in_object(carried.grasp, friction=friction, edges=edges)
 
     def _object_grasp(
-        self, grasp: Grasp, contacts: Floats, normals: Floats, friction: float, edges: int
+        self, grasp: Grasp, contacts: Floats, normals: Floats, friction: ArrayLike, edges: int
     ) -> ObjectGrasp:
-        scale = self.length_scale
-        center = self.to_object(self.surface.center_of_mass)
-        value = quality(contacts / scale, normals, center / scale, friction=friction, edges=edges)
-        return ObjectGrasp(grasp, value, locked(contacts), locked(normals), locked(center), scale)
+        hand = fingers(friction, edges, len(grasp))
+        made = PlacedGrasp(contacts, normals, self.to_object(self.surface.center_of_mass))
+        options = {
+            "friction": carried(hand),
+            "edges": hand[1],
+            "length_scale": self.length_scale,
+        }
+        return ObjectGrasp(
+            made.contacts,
+            made.normals,
+            made.center_of_mass,
+            grasp=grasp,
+            surface=self.surface,
+            quality=quality(made, **options),
+            **options,
+        )
 
-    def to_object(self, points: Floats) -> Floats:
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the fit as a NumPy ``.npz`` file, whole or not at all."""
+        with replacing(a_path(path)) as temporary, temporary.open("wb") as file:
+            np.savez(
+                file,
+                graspmoduli_fit=FILE_VERSION,
+                coefficients=self.surface.coefficients,
+                heights=[self.surface.bottom, self.surface.top],
+                pose=self.pose,
+                residual=[self.residual.rms, self.residual.max, self.residual.size],
+                shares=[self.coverage, self.unexplained],
+                allowed=self.allowed,
+            )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fit:
+        """Reads what :meth:`save` wrote."""
+        file = a_path(path)
+        try:
+            with file.open("rb") as handle, np.load(handle) as data:
+                version = int(data["graspmoduli_fit"])
+                if version == FILE_VERSION:
+                    bottom, top = data["heights"].tolist()
+                    coverage, unexplained = data["shares"].tolist()
+                    return cls(
+                        surface=Surface.from_coefficients(data["coefficients"], bottom, top),
+                        pose=locked(floats("pose", data["pose"]).reshape(4, 4)),
+                        residual=Residual(*data["residual"].tolist()),
+                        coverage=coverage,
+                        unexplained=unexplained,
+                        allowed=data["allowed"].astype(bool, casting="no"),
+                    )
+        except FileNotFoundError:
+            raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None
+        # NumPy and zipfile raise what they like on files of other kinds.
+        except Exception as error:
+            raise GraspModuliError(
+                f"path must be a file that Fit.save wrote, got {path} ({brief(str(error))})"
+            ) from None
+        raise GraspModuliError(
+            f"path must be a fit's file of version {FILE_VERSION}, got version {version} in {path}"
+        )
+
+    def to_object(self, points: ArrayLike) -> Floats:
         """Points from the surface's to the object's coordinates. Shape (..., 3)."""
-        return points @ self.pose[:3, :3].T + self.pose[:3, 3]
+        given = finite("points", vectors("points", points, "(..., 3)"))
+        return given @ self.pose[:3, :3].T + self.pose[:3, 3]
 
-    def directions_to_object(self, vectors: Floats) -> Floats:
+    def directions_to_object(self, directions: ArrayLike) -> Floats:
         """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
-        return vectors @ self.pose[:3, :3].T
+        given = finite("directions", vectors("directions", directions, "(..., 3)"))
+        return given @ self.pose[:3, :3].T
 
 
 def fit(
@@ -226,11 +290,17 @@ def fit(
         If the file cannot be read, holds several objects (parts farther apart than 3 % of the size
         in a mesh, 8 % in a cloud of points), or the object is no such surface.
     """
-    return fit_object(read(points_or_mesh_or_path), progress)
+    return _fitted(read(points_or_mesh_or_path), progress, stacklevel=3)
 
 
 def fit_object(thing: Object, progress: Callable[[int, int], object] | None = None) -> Fit:
     """As :func:`fit`, of an object that has been read."""
+    return _fitted(thing, progress, stacklevel=3)
+
+
+def _fitted(thing: Object, progress: Callable[[int, int], object] | None, stacklevel: int) -> Fit:
+    """The fit; ``stacklevel``, from here, is that of whom warnings are for."""
+    a_callback("progress", progress)
     candidates = candidate_axes(thing)
     scored: list[tuple[float, Axis]] = []
     for done, candidate in enumerate(candidates):
@@ -247,10 +317,10 @@ def fit_object(thing: Object, progress: Callable[[int, int], object] | None = No
         raise GraspModuliError(
             "object must have an outer wall around some axis, got too little of one"
         )
-    return _fit_about(thing, axis)
+    return _fit_about(thing, axis, stacklevel + 1)
 
 
-def _fit_about(thing: Object, axis: Axis) -> Fit:
+def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     mesh = thing.faces is not None
     hits, grid = fine_hits(thing, axis)
     coarse, _ = regress(thing, hits, grid, intervals=10, columns=8)
@@ -281,7 +351,7 @@ def _fit_about(thing: Object, axis: Axis) -> Fit:
         warnings.warn(
             f"{unexplained:.1%} of the object's outer wall is not explained by the fitted "
             "surface; no grasp is offered there",
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
     # A wall that leans more than the surface, such as a lid's rim, is not what a finger meets.
     crooked = np.abs(np.abs(normals[:, 2]) - hits.tilt) > 0.5

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Floats, floats, locked
+from ._arrays import Floats, brief, finite, floats, locked, unit, vectors
+from ._batches import contact_frames
 from ._core import GraspModuliError
-from .quality import quality, quality_gradient
+from ._values import Value
+from .quality import quality_gradient
 from .surfaces import Surface
+
+if TYPE_CHECKING:
+    from .wrench_space import WrenchSpace
 
 
 class Grasp:
@@ -36,12 +42,22 @@ class Grasp:
                 f"u and theta must have the same shape (m,), got {us.shape} and {thetas.shape}"
             )
         if ((us < 0.0) | (us > 1.0)).any():
-            raise GraspModuliError(f"u must lie in [0, 1], got {us.tolist()}")
-        object.__setattr__(self, "u", locked(us.copy()))
-        object.__setattr__(self, "theta", locked(thetas % (2 * np.pi)))
+            raise GraspModuliError(f"u must lie in [0, 1], got {brief(us.tolist())}")
+        turned = thetas % (2 * np.pi)
+        # A negative angle smaller than rounding ends at 2π; and 0.0 is added so that -0.0, which
+        # is equal to it, has its bits too.
+        turned[turned >= 2 * np.pi] = 0.0
+        object.__setattr__(self, "u", locked(us + 0.0))
+        object.__setattr__(self, "theta", locked(turned + 0.0))
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a Grasp does not change: cannot set {name}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a Grasp does not change: cannot delete {name}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Grasp, (self.u, self.theta)
 
     def __len__(self) -> int:
         return self.u.size
@@ -59,8 +75,12 @@ class Grasp:
 
 
 @dataclass(frozen=True, eq=False)
-class PlacedGrasp:
-    """A grasp configuration (c_1, …, c_m, n_1, …, n_m, z) in the object frame."""
+class PlacedGrasp(Value):
+    """A grasp configuration (c_1, …, c_m, n_1, …, n_m, z) in the object frame.
+
+    ``gm.quality(placed)`` is its Q_l; every function of contacts, normals and a centre of mass
+    takes it in their place.
+    """
 
     #: Contact points. Shape (m, 3).
     contacts: Floats
@@ -69,33 +89,103 @@ class PlacedGrasp:
     #: Centre of mass. Shape (3,).
     center_of_mass: Floats
 
-    def quality(self, *, friction: float = 1.0, edges: int = 8) -> float:
-        """Exact Q_l; see :func:`graspmoduli.quality`."""
-        return quality(
-            self.contacts, self.normals, self.center_of_mass, friction=friction, edges=edges
+    def __post_init__(self) -> None:
+        points = finite("contacts", vectors("contacts", self.contacts, "(m, 3)"))
+        normals = finite("normals", vectors("normals", self.normals, "(m, 3)"))
+        center = floats("center_of_mass", self.center_of_mass)
+        if points.ndim != 2 or points.shape != normals.shape or not points.size:
+            raise GraspModuliError(
+                "contacts and normals must have the same shape (m, 3), "
+                f"got {points.shape} and {normals.shape}"
+            )
+        if center.shape != (3,):
+            raise GraspModuliError(f"center_of_mass must have shape (3,), got {center.shape}")
+        # Copies, as the arrays of results do not change.
+        for name, array in (
+            ("contacts", points.copy()),
+            ("normals", unit("normals", normals)),
+            ("center_of_mass", center.copy()),
+        ):
+            object.__setattr__(self, name, locked(array))
+
+    @property
+    def frames(self) -> Floats:
+        """Contact frames; see :func:`graspmoduli.contact_frames`. Shape (m, 4, 4)."""
+        return locked(contact_frames(self))
+
+    def wrench_space(
+        self,
+        *,
+        friction: ArrayLike | None = None,
+        edges: int | None = None,
+        torsion: float | None = None,
+        length_scale: float | None = None,
+    ) -> WrenchSpace:
+        """What the grasp can do: its :class:`graspmoduli.WrenchSpace`."""
+        from .wrench_space import WrenchSpace
+
+        return WrenchSpace(
+            self, friction=friction, edges=edges, torsion=torsion, length_scale=length_scale
         )
 
 
-@dataclass(frozen=True)
-class RankedGrasp:
-    """A grasp and its quality."""
+@dataclass(frozen=True, eq=False)
+class RankedGrasp(PlacedGrasp):
+    """A grasp on a surface and its quality, with what the quality was computed with.
 
+    ``gm.quality(ranked)`` is ``ranked.quality``, to the bit.
+    """
+
+    #: Contact coordinates.
     grasp: Grasp
+    #: The surface that it lies on.
+    surface: Surface = field(repr=False)
     #: Q_l.
     quality: float
+    #: Friction coefficient, or one per contact.
+    friction: float | tuple[float, ...]
+    #: Edges of the friction cones.
+    edges: int
+    #: Torques are divided by it for the quality.
+    length_scale: float
 
 
-def place(surface: Surface, grasp: Grasp) -> PlacedGrasp:
-    """The grasp's contacts and normals on a surface, with the surface's centre of mass z_S."""
+@overload
+def place(surface: Surface, grasp: Grasp) -> PlacedGrasp: ...
+@overload
+def place(surface: Sequence[Surface], grasp: Grasp) -> list[PlacedGrasp]: ...
+def place(surface: Surface | Sequence[Surface], grasp: Grasp) -> PlacedGrasp | list[PlacedGrasp]:
+    """The grasp's contacts and normals on a surface, with the surface's centre of mass z_S.
+
+    On a list of surfaces: a list, the same grasp on each.
+    """
+    if isinstance(surface, list | tuple):
+        return [place(one, grasp) for one in surface]
+    one = a_surface("surface", surface)
+    a_grasp("grasp", grasp)
     return PlacedGrasp(
-        contacts=locked(surface.points(grasp.u, grasp.theta).copy()),
-        normals=locked(surface.normals(grasp.u, grasp.theta).copy()),
-        center_of_mass=surface.center_of_mass,
+        one.points(grasp.u, grasp.theta),
+        one.normals(grasp.u, grasp.theta),
+        one.center_of_mass,
     )
 
 
+def a_surface(name: str, value: Any) -> Surface:
+    """``value`` if it is a surface."""
+    if not isinstance(value, Surface):
+        raise GraspModuliError(f"{name} must be a Surface, got {brief(value)}")
+    return value
+
+
+def a_grasp(name: str, value: Any) -> Grasp:
+    """``value`` if it is a grasp by contact coordinates."""
+    if not isinstance(value, Grasp):
+        raise GraspModuliError(f"{name} must be a Grasp, got {brief(value)}")
+    return value
+
+
 @dataclass(frozen=True, eq=False)
-class GraspGradient:
+class GraspGradient(Value):
     """Q_l of a grasp on a surface, and its derivatives along the surface."""
 
     #: Q_l.
@@ -110,10 +200,11 @@ def grasp_gradient(
     surface: Surface,
     grasp: Grasp,
     *,
-    friction: float = 1.0,
+    friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
     center_of_mass: ArrayLike | None = None,
+    length_scale: float = 1.0,
 ) -> GraspGradient:
     """Exact derivatives of Q_l by the contact coordinates of a grasp on a surface.
 
@@ -125,15 +216,19 @@ def grasp_gradient(
     ----------
     surface, grasp
         As in :func:`place`.
-    friction, edges, torsion
+    friction, edges, torsion, length_scale
         As in :func:`graspmoduli.quality`.
     center_of_mass
         Shape (3,); the surface's own z_S if not given. It stays where it is.
     """
-    placed = place(surface, grasp)
-    center = placed.center_of_mass if center_of_mass is None else center_of_mass
+    placed = place(a_surface("surface", surface), grasp)
     slope = quality_gradient(
-        placed.contacts, placed.normals, center, friction=friction, edges=edges, torsion=torsion
+        placed,
+        center_of_mass=center_of_mass,
+        friction=friction,
+        edges=edges,
+        torsion=torsion,
+        length_scale=length_scale,
     )
     tangents = surface.tangents(grasp.u, grasp.theta)
     turns = surface.normal_derivatives(grasp.u, grasp.theta)
@@ -142,3 +237,13 @@ def grasp_gradient(
         for tangent, turn in zip(tangents, turns, strict=True)
     )
     return GraspGradient(slope.value, along_u, along_theta)
+
+
+def a_point(name: str, value: Any) -> tuple[Surface, Grasp]:
+    """``value`` if it is a point of the moduli space, a surface and a grasp on it."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise GraspModuliError(f"{name} must be a pair (surface, grasp), got {brief(value)}")
+    surface, grasp = value
+    if not isinstance(surface, Surface) or not isinstance(grasp, Grasp):
+        raise GraspModuliError(f"{name} must be a pair (surface, grasp), got {brief(value)}")
+    return surface, grasp

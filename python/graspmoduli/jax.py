@@ -9,21 +9,21 @@ import numpy as np
 
 import graspmoduli as gm
 
+from ._extras import missing
+
 try:
     import jax
     import jax.numpy as jnp
 except ImportError as error:
-    raise ImportError(
-        "graspmoduli.jax needs JAX: install it with pip install 'graspmoduli[jax]'"
-    ) from error
+    raise missing("graspmoduli.jax", "JAX", "jax") from error
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(3,))
-def _value(contacts: Any, normals: Any, center: Any, options: tuple[float, int, float]) -> Any:
-    friction, edges, torsion = options
+def _value(contacts: Any, normals: Any, center: Any, options: tuple[Any, ...]) -> Any:
+    keywords = dict(options)
 
     def call(*arrays: Any) -> Any:
-        values = gm.quality(*_double(*arrays), friction=friction, edges=edges, torsion=torsion)
+        values = gm.quality(*_double(*arrays), **keywords)
         return np.asarray(values, dtype=contacts.dtype)
 
     shape = jax.ShapeDtypeStruct(contacts.shape[:-2], contacts.dtype)
@@ -32,13 +32,11 @@ def _value(contacts: Any, normals: Any, center: Any, options: tuple[float, int, 
 
 @_value.defjvp
 def _tangent(options: Any, primals: Any, tangents: Any) -> Any:
-    friction, edges, torsion = options
+    keywords = dict(options)
     contacts = primals[0]
 
     def call(*arrays: Any) -> Any:
-        gradient = gm.quality_gradient(
-            *_double(*arrays), friction=friction, edges=edges, torsion=torsion
-        )
+        gradient = gm.quality_gradient(*_double(*arrays), **keywords)
         parts = (gradient.value, gradient.contacts, gradient.normals, gradient.center_of_mass)
         return tuple(np.asarray(part, dtype=contacts.dtype) for part in parts)
 
@@ -62,9 +60,10 @@ def quality(
     normals: Any,
     center_of_mass: Any,
     *,
-    friction: float = 1.0,
+    friction: Any = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    length_scale: float = 1.0,
 ) -> Any:
     """Exact Q_l of a batch of grasps; works under ``jit``, ``grad``, ``jvp`` and ``vmap``.
 
@@ -79,8 +78,8 @@ def quality(
         Shape (..., m, 3).
     center_of_mass
         Shape (..., 3).
-    friction, edges, torsion
-        As in :func:`graspmoduli.quality`; not traced.
+    friction, edges, torsion, length_scale
+        As in :func:`graspmoduli.quality`; friction a number or one per contact, (m,); not traced.
 
     Returns
     -------
@@ -94,5 +93,11 @@ def quality(
         jnp.broadcast_to(contacts, batch + contacts.shape[-2:]),
         jnp.broadcast_to(unit, batch + unit.shape[-2:]),
         jnp.broadcast_to(center, (*batch, 3)),
-        (friction, edges, torsion),
+        (
+            # Hashable, as what is not traced must be.
+            ("friction", friction if np.ndim(friction) == 0 else tuple(map(float, friction))),
+            ("edges", edges),
+            ("torsion", torsion),
+            ("length_scale", length_scale),
+        ),
     )

@@ -34,6 +34,7 @@ from .drawing import (
 from .fitting import Fit, ObjectGrasp
 from .grasps import Grasp, place
 from .moduli import Point, interpolate, sample_weights
+from .quality import quality
 from .reading import Object
 from .surfaces import Surface, combine
 from .transfers import QualityAlong, Transfer
@@ -132,7 +133,7 @@ def plot_surface(
         if column:
             axes.set_title("from the other side", fontsize=10, color="0.35", y=-0.05)
     if grasp is not None:
-        value = place(surface, grasp).quality(friction=friction, edges=edges)
+        value = quality(place(surface, grasp), friction=friction, edges=edges)
         title = f"{title}    $Q_{{{edges}}}$ = {value:.4f}    (μ = {friction:g})".strip()
     figure.suptitle(title, fontsize=13, y=0.97)
     return figure
@@ -174,7 +175,7 @@ def plot_row(
     for column, ((surface, grasp), label) in enumerate(zip(points, labels, strict=True)):
         axes = figure.add_axes((column / n, 0.15, 1.0 / n, 0.72))
         _draw_surface(axes, surface, grasp, azimuth, friction, edges, labels=False)
-        value = place(surface, grasp).quality(friction=friction, edges=edges)
+        value = quality(place(surface, grasp), friction=friction, edges=edges)
         # Lost is said in words and in colour.
         text, color = (f"Q = {value:.3f}", "0.15") if value > 0.0 else ("lost", "#D55E00")
         axes.set_title(f"{label}\n{text}", fontsize=10, color=color, y=-0.22)

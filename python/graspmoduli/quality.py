@@ -1,74 +1,120 @@
-"""The grasp quality Q_l (Sec. II of the paper), its relatives and its gradient."""
+"""The grasp quality Q_l (Sec. II of the paper), its relatives and its gradient.
+
+Import them from the package: ``graspmoduli.quality`` is the function, which hides this module of
+the same name. ``from graspmoduli.quality import ...`` still reaches into the module.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, coefficient, count, grasps, locked, number
+from ._arrays import Floats, brief, locked, number
+from ._batches import Batch, GraspLike, batch
 from ._core import GraspModuliError
+from ._values import Value
 
 #: What ``norm`` may be: the normal forces of all fingers sum to at most 1, or each is at most 1.
 NORMS = ("sum", "each")
 
 
+@overload
 def quality(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
+    contacts: ArrayLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
     *,
-    friction: float = 1.0,
-    edges: int = 8,
-    torsion: float = 0.0,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
     norm: str = "sum",
+    length_scale: ArrayLike | None = None,
+) -> Any: ...
+
+
+@overload
+def quality(
+    contacts: GraspLike,
+    normals: None = None,
+    center_of_mass: ArrayLike | None = None,
+    *,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    norm: str = "sum",
+    length_scale: float | None = None,
+) -> float: ...
+
+
+def quality(
+    contacts: Any,
+    normals: Any = None,
+    center_of_mass: Any = None,
+    *,
+    friction: Any = None,
+    edges: Any = None,
+    torsion: Any = None,
+    norm: str = "sum",
+    length_scale: Any = None,
 ) -> Any:
     """Exact grasp quality Q_l.
 
     The largest wrench, in any direction, that the grasp resists when the normal forces of all
     fingers sum to 1: the distance from the origin to the boundary of the convex hull of the
     contact wrenches, or exactly 0 where the origin is not in its interior (the grasp is not force
-    closure). Two hard contacts, collinear and coincident contacts have quality 0.
+    closure). Two hard contacts, collinear and coincident hard contacts have quality 0.
 
     Parameters
     ----------
     contacts
-        Contact points c_i in the object frame, in the unit of the object. Shape (..., m, 3).
+        Contact points c_i in the object frame, in the unit of the object. Shape (..., m, 3). Or a
+        grasp of the library, or a list of them, with nothing else: it is evaluated with the
+        friction, edges, torsion and length scale that it was made with, where it has them and you
+        do not say otherwise, so that ``gm.quality(best) == best.quality``. Or contact frames, see
+        :func:`graspmoduli.contact_frames`.
     normals
         Unit normals n_i pointing into the object. Shape (..., m, 3).
     center_of_mass
         Centre of mass z, about which torques are taken. Shape (..., 3).
     friction
-        Coulomb friction coefficient μ ≥ 0. Without friction fewer than seven contacts have
-        quality 0.
+        Coulomb friction coefficient μ from 0 to 1e6, 1 if not given: a number, one per contact
+        (m,), or one per contact of every grasp (..., m). Without friction fewer than seven hard
+        contacts, and fewer than four soft ones, have quality 0.
     edges
-        Number l ≥ 3 of edges of the friction cones.
+        Number l of edges of the friction cones, from 3 to 65,536; 8 if not given.
     torsion
-        Torsional friction coefficient γ ≥ 0 of soft fingers, a length: with normal force 1 a
-        finger also applies a torque about its normal of up to γ. Sliding and torsional friction
-        trade off linearly.
+        Torsional friction coefficient γ ≥ 0 of soft fingers, a length; 0, hard fingers, if not
+        given. With normal force 1 a finger also applies a torque about its normal of up to γ.
+        Sliding and torsional friction trade off linearly.
     norm
         ``"sum"``: the normal forces of all fingers sum to at most 1, Q_l. ``"each"``: every one is
         at most 1, the L^∞ measure Q'_l.
+    length_scale
+        Torques are divided by this length, in the unit of the object; 1 if not given, as in the
+        paper. With a length of the object itself Q does not depend on the unit. A number, or one
+        per grasp (...).
 
     Returns
     -------
     float or array of shape (...)
-        A float for a single grasp. Torques carry the unit of length, so Q depends on it.
+        A float for a single grasp.
 
     Raises
     ------
     GraspModuliError
-        If a shape is wrong, a value is not finite, a normal is not unit (to 1e-4), μ < 0, l < 3,
-        γ < 0, or the norm is unknown.
+        If a shape is wrong, a value is not finite, a normal is not unit (to 1e-4), a coefficient or
+        number is out of its range, or the norm is unknown; and where the farthest contact is more
+        than 1e60 or less than 1e-60 length scales (but not 0) away from the centre of mass.
 
     Notes
     -----
     Three hard contacts with ``norm="sum"`` have a closed form. All else goes by an expanding
-    polytope, some fifty times slower, that takes a hull for 0 if it surrounds the origin by less
+    polytope, 36 to 1,300 times slower, that takes a hull for 0 if it surrounds the origin by less
     than 1e-9 of the lever arms.
 
     Examples
@@ -80,37 +126,47 @@ def quality(
     >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     >>> round(gm.quality(circle, -circle, [0, 0, 0]), 9)
     0.544232187
+
+    The same in millimetres, with torques over the circle's radius:
+
+    >>> round(gm.quality(1000 * circle, -circle, [0, 0, 0], length_scale=1000), 9)
+    0.544232187
     """
-    if norm not in NORMS:
-        raise GraspModuliError(f'norm must be "sum" or "each", got {norm!r}')
-    cone = _cone(friction, edges, torsion)
-    points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-    values = _core.quality(points, directions, center, *cone, norm == "each")
-    return values.reshape(batch) if batch else float(values[0])
+    # A single grasp whose arrays are as they should be; anything else takes the careful way.
+    value = _core.quality_of_one(
+        contacts, normals, center_of_mass, friction, edges, torsion, norm, length_scale
+    )
+    if value is not None:
+        return value
+    if not isinstance(norm, str) or norm not in NORMS:
+        raise GraspModuliError(f'norm must be "sum" or "each", got {brief(norm)}')
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, norm == "each"))
 
 
-@dataclass(frozen=True)
-class QualityGradient:
+@dataclass(frozen=True, eq=False)
+class QualityGradient(Value):
     """Q_l and its derivatives."""
 
     #: Q_l. A float for a single grasp, else shape (...).
     value: Any
-    #: ∂Q/∂c_i. Shape (..., m, 3).
+    #: ∂Q/∂c_i, per unit of length of the object. Shape (..., m, 3).
     contacts: Floats
     #: ∂Q/∂n_i, tangent to the sphere at n_i. Shape (..., m, 3).
     normals: Floats
-    #: ∂Q/∂z. Shape (..., 3).
+    #: ∂Q/∂z, per unit of length of the object. Shape (..., 3).
     center_of_mass: Floats
 
 
 def quality_gradient(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
+    contacts: ArrayLike | GraspLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
     *,
-    friction: float = 1.0,
-    edges: int = 8,
-    torsion: float = 0.0,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    length_scale: ArrayLike | None = None,
 ) -> QualityGradient:
     """Exact gradient of Q_l with respect to contacts, normals and centre of mass.
 
@@ -125,29 +181,30 @@ def quality_gradient(
     generalised one on its boundary. Where a normal is −e₃ the contact frame is not continuous, and
     the motion of its tangents is left out.
     """
-    cone = _cone(friction, edges, torsion)
-    points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-    m = points.shape[1]
-    rows = _core.quality_gradient(points, directions, center, *cone)
-    value = rows[:, 0].reshape(batch) if batch else float(rows[0, 0])
-    split = 1 + 3 * m
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    m, shape = grasps.arrays[0].shape[1], grasps.shape
+    rows = _core.quality_gradient(grasps.arrays, grasps.cone)
+    value, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
+    # The kernel's derivatives are by lengths over the length scale.
+    scale = grasps.scale[..., None]
     return QualityGradient(
-        value=value,
-        contacts=locked(rows[:, 1:split].reshape((*batch, m, 3))),
-        normals=locked(rows[:, split : split + 3 * m].reshape((*batch, m, 3))),
-        center_of_mass=locked(rows[:, split + 3 * m :].reshape((*batch, 3))),
+        value=grasps.shaped(value[:, 0].copy()),
+        contacts=locked((by_contact / scale).reshape((*shape, m, 3))),
+        normals=locked(by_normal.reshape((*shape, m, 3))),
+        center_of_mass=locked((by_center / scale).reshape((*shape, 3))),
     )
 
 
 def quality_at_least(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
-    threshold: float,
+    contacts: ArrayLike | GraspLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
+    threshold: float | None = None,
     *,
-    friction: float = 1.0,
-    edges: int = 8,
-    torsion: float = 0.0,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    length_scale: ArrayLike | None = None,
 ) -> Any:
     """Is Q_l ≥ ``threshold``?
 
@@ -155,10 +212,8 @@ def quality_at_least(
     given up as soon as the answer is known. A bool for a single grasp, else shape (...).
     """
     bar = number("threshold", threshold)
-    cone = _cone(friction, edges, torsion)
-    points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-    values = _core.quality_at_least(points, directions, center, bar, *cone)
-    return values.reshape(batch) if batch else bool(values[0])
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    return grasps.shaped(_core.quality_at_least(grasps.arrays, grasps.cone, bar))
 
 
 @dataclass(frozen=True)
@@ -172,56 +227,57 @@ class Extreme:
 
 
 def largest_quality(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
+    contacts: ArrayLike | GraspLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
     *,
-    friction: float = 1.0,
-    edges: int = 8,
-    torsion: float = 0.0,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The best of a batch of grasps by Q_l, the first among equals.
 
     The same as the maximum of :func:`quality`, whose arguments and errors it shares, but a grasp
     is given up as soon as it is known to be worse than the best so far.
     """
-    return _extreme(contacts, normals, center_of_mass, _cone(friction, edges, torsion), True)
+    return _extreme(
+        batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale), True
+    )
 
 
 def smallest_quality(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
+    contacts: ArrayLike | GraspLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
     *,
-    friction: float = 1.0,
-    edges: int = 8,
-    torsion: float = 0.0,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The worst of a batch of grasps by Q_l, the first among equals.
 
     The same as the minimum of :func:`quality`, whose arguments and errors it shares, but a grasp
     is given up as soon as it is known not to be worse than the worst so far.
     """
-    return _extreme(contacts, normals, center_of_mass, _cone(friction, edges, torsion), False)
+    return _extreme(
+        batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale), False
+    )
 
 
-def _extreme(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
-    cone: tuple[float, int, float],
-    largest: bool,
-) -> Extreme:
-    points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-    found = _core.extreme_quality(points, directions, center, *cone, largest)
+def _extreme(grasps: Batch, largest: bool) -> Extreme:
+    found = _core.extreme_quality(grasps.arrays, grasps.cone, largest)
     if found is None:
-        raise GraspModuliError(f"contacts must hold at least one grasp, got shape {points.shape}")
+        raise GraspModuliError(
+            f"contacts must hold at least one grasp, got a batch of shape {grasps.shape}"
+        )
     index, value = found
-    return Extreme(tuple(int(i) for i in np.unravel_index(index, batch)), value)
+    return Extreme(tuple(int(i) for i in np.unravel_index(index, grasps.shape)), value)
 
 
-@dataclass(frozen=True)
-class Bounds:
+@dataclass(frozen=True, eq=False)
+class Bounds(Value):
     """What is proven of a quality: lower ≤ Q ≤ upper. Floats for a single grasp."""
 
     lower: Any
@@ -237,42 +293,36 @@ class Bounds:
 
 
 def circular_quality(
-    contacts: ArrayLike,
-    normals: ArrayLike,
-    center_of_mass: ArrayLike,
+    contacts: ArrayLike | GraspLike | Sequence[GraspLike],
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
     *,
-    friction: float = 1.0,
+    friction: ArrayLike | None = None,
     tolerance: float = 1e-3,
+    length_scale: ArrayLike | None = None,
 ) -> Bounds:
-    """The quality with exact, circular friction cones instead of polygonal ones.
+    """The quality with exact, circular friction cones instead of polygonal ones, of hard fingers.
 
     Arguments and errors are those of :func:`quality`. The hull has no finite set of corners, so
-    the answer is a proven lower and a proven upper bound; see ``value`` of the result. Unlike Q_l
-    it does not depend on the coordinates' axes.
+    the answer is a lower and an upper bound, see ``value`` of the result. Both are proven, up to
+    1e-9 of the lever arms: a hull that surrounds the origin by less counts as flat, and both are 0.
+    Unlike Q_l they do not depend on the coordinates' axes. The torsion of a soft grasp is left out.
 
     Parameters
     ----------
-    contacts, normals, center_of_mass, friction
+    contacts, normals, center_of_mass, friction, length_scale
         As in :func:`quality`.
     tolerance
         The bounds are driven to within this of each other, relative to the upper one; from 1e-6
         to 1. They may stay further apart where that takes more than four million facets.
     """
-    mu = coefficient("friction", friction)
     wanted = number("tolerance", tolerance)
     if not 1e-6 <= wanted <= 1.0:
         raise GraspModuliError(f"tolerance must lie in [1e-6, 1], got {wanted}")
-    points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-    rows = _core.circular_quality(points, directions, center, mu, wanted)
-    lower, upper = rows[:, 0], rows[:, 1]
-    if batch:
-        return Bounds(locked(lower.reshape(batch)), locked(upper.reshape(batch)), wanted)
-    return Bounds(float(lower[0]), float(upper[0]), wanted)
-
-
-def _cone(friction: Any, edges: Any, torsion: Any) -> tuple[float, int, float]:
-    return (
-        coefficient("friction", friction),
-        count("edges", edges, 3),
-        coefficient("torsion", torsion),
-    )
+    grasps = batch(contacts, normals, center_of_mass, friction, None, 0.0, length_scale)
+    rows = _core.circular_quality(grasps.arrays, grasps.cone, wanted)
+    lower, upper = (grasps.shaped(column.copy()) for column in rows.T)
+    for bound in (lower, upper):
+        if isinstance(bound, np.ndarray):
+            locked(bound)
+    return Bounds(lower, upper, wanted)

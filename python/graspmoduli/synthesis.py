@@ -8,15 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, cells, cone, coordinates, cores, count, floats
+from ._arrays import Floats, a_callback, cells, coordinates, cores, count, floats
+from ._batches import Cone, carried, fingers, frictions_of
 from ._core import GraspModuliError
-from .grasps import Grasp, RankedGrasp
-from .quality import largest_quality
+from .grasps import Grasp, RankedGrasp, a_surface, place
+from .quality import largest_quality, quality
 from .sampling import unit_square
 from .surfaces import Surface
 
 #: Sampled contacts from which synthesis starts where deformation does not find enough grasps.
 EXTRA_SAMPLES = 40
+#: Most contacts of a grasp that is searched for, most grasps that are returned, most threads.
+MOST_CONTACTS, MOST_RANKED, MOST_THREADS = 100, 1_000_000, 1_024
+#: Most grasps that synthesis returns, or follows.
+MOST_FOLLOWED = 10_000
 
 
 def best_grasps(
@@ -26,7 +31,7 @@ def best_grasps(
     *,
     contacts: int = 3,
     top: int = 1,
-    friction: float = 1.0,
+    friction: ArrayLike = 1.0,
     edges: int = 8,
     center_of_mass: ArrayLike | None = None,
     threads: int | None = None,
@@ -45,7 +50,8 @@ def best_grasps(
     top
         How many grasps to return. Fewer come back if fewer are force closure.
     friction, edges
-        As in :func:`graspmoduli.quality`.
+        As in :func:`graspmoduli.quality`; friction positive, a number or one per given contact,
+        (n,), such as where an object's parts differ.
     center_of_mass
         Shape (3,); the surface's own z_S if not given.
     threads
@@ -59,37 +65,46 @@ def best_grasps(
         Best first, equal ones in the order of their contacts. The same as evaluating every
         subset: those that are left out are proven to be worse.
     """
-    mu, l = cone(friction, edges)
+    center = center_of(a_surface("surface", surface), center_of_mass)
     us, thetas, shape = coordinates(u, theta)
     if len(shape) != 1:
         raise GraspModuliError(f"u and theta must have shape (n,), got {shape}")
-    size = count("contacts", contacts, 1)
+    size = count("contacts", contacts, 1, MOST_CONTACTS)
     if us.size < size:
         raise GraspModuliError(f"u and theta must hold at least {size} contacts, got {us.size}")
-    top = count("top", top, 1)
-    workers = cores() if threads is None else count("threads", threads, 1)
+    each = frictions_of(friction, us.size, positive=True)
+    if each.ndim != 1:
+        raise GraspModuliError(
+            f"friction must be a number or have shape ({us.size},), got {each.shape}"
+        )
+    hand = fingers(each[0], edges, size)
+    top = count("top", top, 1, MOST_RANKED)
+    workers = cores() if threads is None else count("threads", threads, 1, MOST_THREADS)
+    a_callback("progress", progress)
     ranked = _core.best_subsets(
         np.ascontiguousarray(surface.points(us, thetas)),
         np.ascontiguousarray(surface.normals(us, thetas)),
-        _center(surface, center_of_mass),
-        mu,
-        l,
+        each if each.size > 1 else None,
+        center,
+        hand,
         size,
         top,
         workers,
         progress,
     )
-    return [
-        RankedGrasp(Grasp(us[list(indices)], thetas[list(indices)]), value)
-        for indices, value in ranked
-    ]
+    found = []
+    for indices, _ in ranked:
+        chosen = list(indices)
+        own = hand if each.size == 1 else (each[chosen].tolist(), hand[1], 0.0)
+        found.append(ranked_grasp(surface, Grasp(us[chosen], thetas[chosen]), center, own))
+    return found
 
 
 def synthesize(
     surface: Surface,
     *,
     top: int = 5,
-    friction: float = 1.0,
+    friction: ArrayLike = 1.0,
     edges: int = 8,
     seed: int = 0,
     center_of_mass: ArrayLike | None = None,
@@ -110,7 +125,7 @@ def synthesize(
     top
         How many grasps are wanted. Fewer come back if fewer different ones are found.
     friction, edges
-        As in :func:`graspmoduli.quality`.
+        As in :func:`graspmoduli.quality`; friction positive, a number or one per finger, (3,).
     seed
         Of the sampled contacts.
     center_of_mass
@@ -125,38 +140,43 @@ def synthesize(
     Returns
     -------
     list of RankedGrasp
-        Best first. The contacts of any two differ by at least 15 % of the object's radius.
+        Best first. Of any two grasps, in whatever order their contacts are compared, at least one
+        contact differs by 15 % of the object's radius.
     """
-    mu, l = cone(friction, edges)
-    top = count("top", top, 1)
-    followed = top + 1 if starts is None else count("starts", starts, 1)
+    hand = fingers(friction, edges, 3)
+    center = center_of(a_surface("surface", surface), center_of_mass)
+    top = count("top", top, 1, MOST_FOLLOWED)
+    followed = top + 1 if starts is None else count("starts", starts, 1, MOST_FOLLOWED)
     square = unit_square(EXTRA_SAMPLES, seed)
     rows = _core.synthesize(
         surface._core,
-        _center(surface, center_of_mass),
-        mu,
-        l,
+        center,
+        hand,
         top,
         followed,
         square,
         cells(allowed),
     )
-    return [RankedGrasp(Grasp(row[0:6:2], row[1:6:2]), float(row[6])) for row in rows]
+    grasps = [Grasp(row[0:6:2], row[1:6:2]) for row in rows]
+    return [ranked_grasp(surface, grasp, center, hand) for grasp in grasps]
 
 
 def plane_grasp(
-    surface: Surface, *, heights: int = 10, friction: float = 1.0, edges: int = 8
+    surface: Surface, *, heights: int = 10, friction: ArrayLike = 1.0, edges: int = 8
 ) -> RankedGrasp | None:
     """The best of the triples (u₁, 0), (u₂, π), (u₃, π), u₂ < u₃: the heuristic of Sec. IV.E.
 
-    Made for surfaces of revolution, whose best grasps lie in a plane with the axis. The heights are
-    equally spaced from 0 to 1; ten of them give the paper's 450 triples.
+    Made for surfaces of revolution, many of whose good grasps lie in a plane with the axis; on some
+    the best does not, but has its fingers evenly around. The heights are equally spaced from 0 to
+    1; ten of them give the paper's 450 triples.
 
     Returns
     -------
     RankedGrasp, or None if no triple is force closure
     """
-    n = count("heights", heights, 2)
+    hand = fingers(friction, edges, 3)
+    a_surface("surface", surface)
+    n = count("heights", heights, 2, 1_000)
     u = np.linspace(0.0, 1.0, n)
     one, two, three = (
         index.ravel()
@@ -170,10 +190,31 @@ def plane_grasp(
     if best.quality == 0.0:
         return None
     row = triples[best.index[0]]
-    return RankedGrasp(Grasp(at[0][row], at[1][row]), best.quality)
+    center = center_of(surface, None)
+    return ranked_grasp(surface, Grasp(at[0][row], at[1][row]), center, hand)
 
 
-def _center(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, float, float]:
+def ranked_grasp(
+    surface: Surface, grasp: Grasp, center: tuple[float, float, float], hand: Cone
+) -> RankedGrasp:
+    """A grasp that was found, with its quality as every other function will see it."""
+    placed = place(surface, grasp)
+    friction, edges = carried(hand), hand[1]
+    return RankedGrasp(
+        contacts=placed.contacts,
+        normals=placed.normals,
+        center_of_mass=np.array(center),
+        grasp=grasp,
+        surface=surface,
+        quality=quality(placed, center_of_mass=center, friction=friction, edges=edges),
+        friction=friction,
+        edges=edges,
+        length_scale=1.0,
+    )
+
+
+def center_of(surface: Surface, center_of_mass: ArrayLike | None) -> tuple[float, float, float]:
+    """The centre of mass given, or the surface's own."""
     center: Floats = (
         surface.center_of_mass
         if center_of_mass is None

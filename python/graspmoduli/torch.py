@@ -6,13 +6,13 @@ from typing import Any
 
 import graspmoduli as gm
 
+from ._extras import missing
+
 try:
     import torch
     from torch.autograd.function import once_differentiable
 except ImportError as error:
-    raise ImportError(
-        "graspmoduli.torch needs PyTorch: install it with pip install 'graspmoduli[torch]'"
-    ) from error
+    raise missing("graspmoduli.torch", "PyTorch", "torch") from error
 
 
 class _Quality(torch.autograd.Function):
@@ -20,7 +20,7 @@ class _Quality(torch.autograd.Function):
     def forward(
         ctx: Any, contacts: Any, normals: Any, center_of_mass: Any, options: dict[str, Any]
     ) -> Any:
-        arrays = [t.detach().cpu().numpy() for t in (contacts, normals, center_of_mass)]
+        arrays = [t.detach().numpy() for t in (contacts, normals, center_of_mass)]
         if not any(ctx.needs_input_grad):
             return contacts.new_tensor(gm.quality(*arrays, **options))
         gradient = gm.quality_gradient(*arrays, **options)
@@ -42,16 +42,17 @@ def quality(
     normals: Any,
     center_of_mass: Any,
     *,
-    friction: float = 1.0,
+    friction: Any = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    length_scale: float = 1.0,
 ) -> Any:
     """Exact Q_l of a batch of grasps, with its exact gradient on the way back.
 
     As :func:`graspmoduli.quality`, with these differences: arguments and result are floating-point
-    tensors (of any device; computed in float64 on the CPU), and normals are divided by their
-    length, so that they may be free parameters. Where Q is not differentiable, or 0, the gradient
-    is that of :func:`graspmoduli.quality_gradient`. Second derivatives are not available.
+    tensors (of any type and device; computed in float64 on the CPU), and normals are divided by
+    their length, so that they may be free parameters. Where Q is not differentiable, or 0, the
+    gradient is that of :func:`graspmoduli.quality_gradient`. Second derivatives are not available.
 
     Parameters
     ----------
@@ -59,25 +60,30 @@ def quality(
         Shape (..., m, 3).
     center_of_mass
         Shape (..., 3).
-    friction, edges, torsion
-        As in :func:`graspmoduli.quality`.
+    friction, edges, torsion, length_scale
+        As in :func:`graspmoduli.quality`; friction a number or an array, not a tensor that is
+        differentiated by.
 
     Returns
     -------
     torch.Tensor
         Shape (...), with the type and device of ``contacts``.
     """
-    contacts, normals, center_of_mass = (
-        torch.as_tensor(t) for t in (contacts, normals, center_of_mass)
-    )
-    batch = torch.broadcast_shapes(
-        contacts.shape[:-2], normals.shape[:-2], center_of_mass.shape[:-1]
-    )
+    tensors = [torch.as_tensor(t) for t in (contacts, normals, center_of_mass)]
+    # To the CPU first: not every device knows double precision.
+    points, directions, center = (t.cpu().double() for t in tensors)
+    batch = torch.broadcast_shapes(points.shape[:-2], directions.shape[:-2], center.shape[:-1])
     # Normalised in double precision: what is unit in single precision is not quite.
-    unit = torch.nn.functional.normalize(normals.double(), dim=-1)
-    return _Quality.apply(
-        contacts.expand(*batch, *contacts.shape[-2:]),
+    unit = torch.nn.functional.normalize(directions, dim=-1)
+    value = _Quality.apply(
+        points.expand(*batch, *points.shape[-2:]),
         unit.expand(*batch, *unit.shape[-2:]),
-        center_of_mass.expand(*batch, 3),
-        {"friction": friction, "edges": edges, "torsion": torsion},
+        center.expand(*batch, 3),
+        {
+            "friction": friction,
+            "edges": edges,
+            "torsion": torsion,
+            "length_scale": length_scale,
+        },
     )
+    return value.to(tensors[0].dtype).to(tensors[0].device)

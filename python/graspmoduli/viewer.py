@@ -479,7 +479,7 @@ class ShapePage:
             if t > 1e-9:
                 here = combine([self.ends[0], far], [1.0 - t, t])
                 carried = self._carried(here, method).grasp
-            value = place(here, carried).quality()
+            value = quality(place(here, carried))
             marks = np.full(len(path.t), np.nan)
             nearest = int(np.abs(path.t - t).argmin())
             marks[nearest] = value

@@ -4,156 +4,194 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, coefficient, count, floats, grasps, locked
+from ._arrays import Floats, floats, locked
+from ._batches import GraspLike, batch
 from ._core import GraspModuliError
-from .quality import quality
+from ._values import Value, hashable, same
+from .equilibrium import BALANCED, least_sum
+from .halfspaces import FLAT, facet_normals, hull_volume
 
 #: Equilibria within this of the origin, in units of forces and of torques over the longest lever
 #: arm, are the origin but for rounding.
 ON_THE_BOUNDARY = 1e-9
+#: Loads whose forces or torques are larger than this are refused.
+LARGEST_LOAD = 1e150
 
 
 @dataclass(frozen=True, eq=False)
-class Resistance:
+class Resistance(Value):
     """How a grasp resists a wrench, or why it cannot."""
 
-    #: Contact forces within the friction cones that balance the wrench with the least sum of normal
-    #: forces, in the object frame. Shape (m, 3). None if there are none.
+    #: Contact forces within the friction cones that balance the wrench, to 1e-11 of its size, with
+    #: the least sum of normal forces, in the object frame. Shape (m, 3). None if there are none.
     forces: Floats | None
     #: Torques about the normals of soft fingers. Shape (m,). None if there are none.
     torques: Floats | None
     #: The sum of the normal forces, infinite if there are none.
     normal_force: float
-    #: If there are none, the proof: a unit twist (v, ω) along which the wrench does work on the
-    #: object and no contact force works against it. Shape (6,). Else None.
+    #: If there are none, the proof: a twist (v, ω) along which the wrench does work on the object
+    #: and no contact force works against it, beyond rounding. (v, ω times the length scale) has
+    #: length 1. Shape (6,). Else None.
     proof: Floats | None
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpaces(Value):
+    """{x: ⟨x, v_i⟩ ≤ λ_i for all i}."""
+
+    #: v_i: twists (v, ω), of length 1 as (v, ω times the length scale). Shape (s, 6).
+    normals: Floats
+    #: λ_i. Shape (s,).
+    offsets: Floats
 
 
 class WrenchSpace:
     """The grasp wrench space of one grasp: all wrenches that its fingers can apply.
 
     It is the convex hull S of the contact wrenches w_ij = (f_ij, (c_i − z) × f_ij) while the normal
-    forces sum to 1, and the cone over S without a limit.
+    forces sum to 1, and the cone over S without a limit. All wrenches that it takes and returns
+    are in the caller's own units of force and length.
 
     Parameters
     ----------
-    contacts, normals
-        Contact points, and unit normals pointing into the object. Shape (m, 3).
-    center_of_mass
-        Shape (3,).
-    friction, edges, torsion
-        As in :func:`graspmoduli.quality`.
+    contacts, normals, center_of_mass
+        One grasp: contact points and unit normals pointing into the object, of shape (m, 3), and
+        the centre of mass, (3,); or a grasp of the library, or frames, as in
+        :func:`graspmoduli.quality`.
+    friction, edges, torsion, length_scale
+        As in :func:`graspmoduli.quality`. The length scale says how torques are weighed against
+        forces: in ``quality`` and ``status``, in which wrench is the ``weakest``, and in the
+        ``offsets`` of ``facets``. It does not matter to ``resist``.
     """
 
     def __init__(
         self,
-        contacts: ArrayLike,
-        normals: ArrayLike,
-        center_of_mass: ArrayLike,
+        contacts: ArrayLike | GraspLike,
+        normals: ArrayLike | None = None,
+        center_of_mass: ArrayLike | None = None,
         *,
-        friction: float = 1.0,
-        edges: int = 8,
-        torsion: float = 0.0,
+        friction: ArrayLike | None = None,
+        edges: int | None = None,
+        torsion: float | None = None,
+        length_scale: float | None = None,
     ) -> None:
-        points, directions, center, batch = grasps(contacts, normals, center_of_mass)
-        if batch:
+        self._batch = batch(
+            contacts, normals, center_of_mass, friction, edges, torsion, length_scale
+        )
+        if self._batch.shape:
             raise GraspModuliError(
-                f"contacts must have shape (m, 3), one grasp, got {np.shape(contacts)}"
+                f"contacts must be one grasp, of shape (m, 3), got a batch of {self._batch.shape}"
             )
+        _, directions, _, each = self._batch.arrays
+        points, center, self.torsion = self._batch.given
+        (mu,), self.edges, _ = self._batch.cone
         #: Contact points. Shape (m, 3).
-        self.contacts: Floats = locked(points[0])
+        self.contacts: Floats = locked(points.copy())
         #: Unit normals pointing into the object. Shape (m, 3).
         self.normals: Floats = locked(directions[0])
         #: Shape (3,).
-        self.center_of_mass: Floats = locked(center[0])
-        self.friction = coefficient("friction", friction)
-        self.edges = count("edges", edges, 3)
-        self.torsion = coefficient("torsion", torsion)
+        self.center_of_mass: Floats = locked(center.copy())
+        #: Friction coefficient of each contact. Shape (m,).
+        self.friction: Floats = locked(np.full(len(points), mu) if each is None else each[0])
+        #: Torques are divided by this length for the quality.
+        self.length_scale = float(self._batch.scale)
 
-    def _arguments(self) -> tuple[Floats, Floats, tuple[float, float, float], float, int, float]:
-        x, y, z = self.center_of_mass.tolist()
-        return self.contacts, self.normals, (x, y, z), self.friction, self.edges, self.torsion
+    def _key(self) -> tuple[Any, ...]:
+        return (
+            self.contacts,
+            self.normals,
+            self.center_of_mass,
+            self.friction,
+            self.edges,
+            self.torsion,
+            self.length_scale,
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, WrenchSpace):
+            return NotImplemented
+        return all(same(a, b) for a, b in zip(self._key(), other._key(), strict=True))
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(hashable, self._key())))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _space, self._key()
 
     @cached_property
     def quality(self) -> float:
         """Exact Q_l; see :func:`graspmoduli.quality`."""
-        return quality(
-            self.contacts,
-            self.normals,
-            self.center_of_mass,
-            friction=self.friction,
-            edges=self.edges,
-            torsion=self.torsion,
-        )
+        return self._batch.shaped(_core.quality(self._batch.arrays, self._batch.cone, False))
 
     @cached_property
     def weakest(self) -> Floats:
-        """The disturbance that the grasp resists least: a unit wrench (force, torque).
+        """The disturbance that the grasp resists least: a wrench (force, torque) of length 1.
 
+        Its length, as everywhere for the quality, is that of (force, torque over the length scale).
         Under a disturbance d the fingers must apply −d. They can as long as ‖d‖ ≤ Q_l times the sum
         of their normal forces, and not more along this direction. If Q_l = 0, they cannot resist it
         at all, however hard they press. Shape (6,).
         """
-        _, direction = _core.weakest(*self._arguments(), False)
-        return locked(-np.array(direction))
+        _, direction = _core.weakest(self._batch.arrays, self._batch.cone, False)
+        return locked(-np.array(direction) * self._units)
 
     @cached_property
     def status(self) -> str:
         """``"force closure"``, ``"on the boundary"`` or ``"outside"``: where the origin is in S.
 
-        On the boundary, some fingers can hold each other in balance, but a disturbance, however
-        small, that they cannot resist exists; outside, not even balance is possible.
+        Force closure is Q_l > 0. On the boundary, some fingers can hold each other in balance, but
+        a disturbance, however small, that they cannot resist exists; outside, not even balance is
+        possible. What is nearer to the boundary than 1e-9, with torques over the longest lever arm,
+        counts as on it.
         """
         if self.quality > 0.0:
             return "force closure"
-        from scipy.optimize import linprog
+        from scipy.optimize import nnls
 
-        scaled, _ = self._scaled()
-        # The least ‖Σ α w‖_∞ over the hull.
-        count = len(scaled)
-        rows = np.vstack([scaled.T, -scaled.T])
-        result = linprog(
-            [*np.zeros(count), 1.0],
-            A_ub=np.hstack([rows, -np.ones((12, 1))]),
-            b_ub=np.zeros(12),
-            A_eq=[[*np.ones(count), 0.0]],
-            b_eq=[1.0],
-        )
-        return "on the boundary" if result.fun <= ON_THE_BOUNDARY else "outside"
+        # Σ α w = 0 with Σ α = 1.
+        scaled = self.wrenches / self._reach
+        rows = np.vstack([scaled.T, np.ones(len(scaled))])
+        _, apart = nnls(rows, np.eye(7)[6], maxiter=100 * len(scaled))
+        return "on the boundary" if apart <= ON_THE_BOUNDARY else "outside"
 
     @cached_property
     def wrenches(self) -> Floats:
         """The corners w_ij, contact after contact. Shape (m·(l or l + 2), 6)."""
-        forces, spins = self._generators()
-        levers = np.repeat(self.contacts - self.center_of_mass, len(spins), axis=0)
-        normals = np.repeat(self.normals, len(spins), axis=0)
-        torques = np.cross(levers, forces) + np.tile(spins, len(self.contacts))[:, None] * normals
-        return locked(np.hstack([forces, torques]))
+        forces, spins = self._generators
+        levers = (self.contacts - self.center_of_mass)[:, None]
+        torques = np.cross(levers, forces) + spins[:, None] * self.normals[:, None]
+        return locked(np.concatenate([forces, torques], axis=-1).reshape(-1, 6))
 
+    @cached_property
     def _generators(self) -> tuple[Floats, Floats]:
-        """Forces of all corners, and their torques about the normals per contact."""
-        angle = 2 * np.pi * np.arange(self.edges) / self.edges
-        local = np.stack([self.friction * np.cos(angle), self.friction * np.sin(angle)], axis=1)
+        """Forces of the corners, (m, k, 3), and their torques about the normals, (k,)."""
+        forces = _core.contact_forces(self.normals, self.friction, self.edges)
         spins = np.zeros(self.edges)
         if self.torsion > 0.0:
-            local = np.vstack([local, np.zeros((2, 2))])
+            forces = np.concatenate([forces, np.repeat(self.normals[:, None], 2, axis=1)], axis=1)
             spins = np.concatenate([spins, [self.torsion, -self.torsion]])
-        first, second = _tangents(self.normals)
-        forces = (
-            local[:, :1] * first[:, None] + local[:, 1:] * second[:, None] + self.normals[:, None]
-        )
-        return forces.reshape(-1, 3), spins
+        return forces, spins
 
-    def _scaled(self) -> tuple[Floats, float]:
-        """Wrenches with torques over the longest lever arm, and that length."""
+    @property
+    def _units(self) -> Floats:
+        return np.array([1.0, 1.0, 1.0, *[self.length_scale] * 3])
+
+    @cached_property
+    def _reach(self) -> Floats:
+        """By which wrenches are about as long in torques as in forces. Shape (6,)."""
         levers = np.linalg.norm(self.contacts - self.center_of_mass, axis=1)
-        length = max(float(levers.max()), self.torsion) or 1.0
-        return self.wrenches / [1.0, 1.0, 1.0, length, length, length], length
+        return np.array([1.0, 1.0, 1.0, *[max(float(levers.max()), self.torsion) or 1.0] * 3])
+
+    @property
+    def _flat(self) -> float:
+        # Force closure has been decided, and needs all six directions.
+        return 0.0 if self.quality > 0.0 else FLAT
 
     def resist(self, wrench: ArrayLike) -> Resistance:
         """Contact forces that balance a wrench on the object, or the proof that none do.
@@ -161,75 +199,114 @@ class WrenchSpace:
         Parameters
         ----------
         wrench
-            Force and torque about the centre of mass that act on the object. Shape (6,).
+            Force and torque about the centre of mass that act on the object, up to 1e150. Shape
+            (6,).
 
         Returns
         -------
         Resistance
-            The forces with the least sum of normal forces, by linear programming.
+            The forces with the least sum of normal forces. Under force closure there always are
+            some, whatever the wrench.
         """
-        from scipy.optimize import linprog
-
         load = floats("wrench", wrench)
         if load.shape != (6,):
             raise GraspModuliError(f"wrench must have shape (6,), got {load.shape}")
-        size = float(np.linalg.norm(load)) or 1.0
-        scaled, length = self._scaled()
-        scales = np.array([1.0, 1.0, 1.0, length, length, length])
-        target = -load / scales / size
-        result = linprog(np.ones(len(scaled)), A_eq=scaled.T, b_eq=target)
-        if result.success:
-            weights = (result.x * size).reshape(len(self.contacts), -1, 1)
-            forces, spins = self._generators()
-            per_contact = forces.reshape(len(self.contacts), -1, 3)
-            return Resistance(
-                forces=locked((weights * per_contact).sum(1)),
-                torques=locked((weights[:, :, 0] * spins).sum(1)),
-                normal_force=float(result.fun * size),
-                proof=None,
+        if np.abs(load).max() > LARGEST_LOAD:
+            raise GraspModuliError(
+                f"wrench must be at most {LARGEST_LOAD:g}, got {np.abs(load).max():g}"
             )
-        # Farkas: a twist with ⟨w, x⟩ ≤ 0 for all wrenches and ⟨target, x⟩ > 0.
-        proof = linprog(-target, A_ub=scaled, b_ub=np.zeros(len(scaled)), bounds=(-1.0, 1.0))
-        twist = proof.x / scales
-        # Contacts do no positive work along x, the load, −target, does along −x.
-        return Resistance(None, None, np.inf, locked(-twist / np.linalg.norm(twist)))
+        target = -load / self._reach
+        size = float(np.abs(target).max()) or 1.0
+        found, twist = self._least(target / size)
+        if found is None:
+            # Contacts do no positive work along the twist, the load, −target, does along minus it.
+            proof = -twist / self._reach
+            return Resistance(
+                None, None, np.inf, locked(proof / np.linalg.norm(proof * self._units))
+            )
+        forces, spins = self._generators
+        weights = found.reshape(len(self.contacts), -1) * size
+        return Resistance(
+            forces=locked((weights[:, :, None] * forces).sum(1)),
+            torques=locked(weights @ spins),
+            normal_force=float(weights.sum()),
+            proof=None,
+        )
+
+    def _least(self, target: Floats) -> tuple[Floats | None, Floats]:
+        """Weights of the wrenches, or a twist that proves that there are none; both with torques
+        over the longest lever arm."""
+        scaled = self.wrenches / self._reach
+        axes, extents, _ = np.linalg.svd(scaled.T)
+        rank = int((extents > self._flat * extents[0]).sum())
+        across = axes[:, rank:]
+        beyond = across @ (across.T @ target)
+        if np.linalg.norm(beyond) > BALANCED * np.linalg.norm(target):
+            return None, beyond
+        # Of the same size in all directions.
+        balancing = axes[:, :rank] / extents[:rank]
+        aim = balancing.T @ target
+        large = float(np.linalg.norm(aim)) or 1.0
+        found, twist = least_sum(balancing.T @ scaled.T, aim / large)
+        if found is None:
+            return None, balancing @ twist
+        return found * large, twist
+
+    @cached_property
+    def facets(self) -> HalfSpaces:
+        """S as half-spaces: S(g) = {x: ⟨x, v_i⟩ ≤ λ_i} (Sec. II), one per facet.
+
+        x is a wrench in your own units. The least of the ``offsets`` is Q_l, if that is positive. A
+        flat S lies between two opposite half-spaces across. By Qhull, each facet then fitted to its
+        wrenches to rounding.
+        """
+        normals = facet_normals(self.wrenches / self._reach, self._flat) / self._reach
+        normals /= np.linalg.norm(normals * self._units, axis=1, keepdims=True)
+        return HalfSpaces(locked(normals), locked((self.wrenches @ normals.T).max(axis=0)))
 
     @cached_property
     def volume(self) -> float:
-        """Volume of S in R⁶, by Qhull; 0 if it is flat. For comparison with other tools."""
-        from scipy.spatial import ConvexHull, QhullError
+        """Volume of S in R⁶, torques over the length scale, by Qhull.
 
-        try:
-            scaled, length = self._scaled()
-            return float(ConvexHull(scaled, qhull_options="QJ").volume * length**3)
-        except QhullError:
-            return 0.0
+        Exactly 0 if S is flat: if it is thinner than 1e-12 of its longest direction, with torques
+        over the longest lever arm, and the grasp not force closure. For comparison with other
+        tools.
+        """
+        shrunk = (self._reach[3] / self.length_scale) ** 3
+        return hull_volume(self.wrenches / self._reach, self._flat) * shrunk
 
     @cached_property
     def smallest_singular_value(self) -> float:
-        """Of the grasp map from the contact forces to their wrench, a 6 × 3m matrix."""
-        levers = self.contacts - self.center_of_mass
-        blocks = [np.vstack([np.eye(3), _cross(r)]) for r in levers]
-        values = np.linalg.svd(np.hstack(blocks), compute_uv=False)
-        return float(values[-1]) if len(values) == 6 else 0.0
+        """Of the grasp map from the contact forces to their wrench, a 6 × 3m matrix.
+
+        Torques over the length scale. Exactly 0 if the map has no full rank, to 1e-12.
+        """
+        reach = float(self._reach[3])
+        levers = (self.contacts - self.center_of_mass) / reach
+        balanced = np.hstack([np.vstack([np.eye(3), _cross(r)]) for r in levers])
+        extents = np.linalg.svd(balanced, compute_uv=False)
+        if len(extents) < 6 or extents[-1] <= FLAT * extents[0]:
+            return 0.0
+        # Through the inverse, whose largest singular value is accurate whatever the lever arms.
+        inverse = np.linalg.pinv(balanced, rcond=FLAT) * (self._units / self._reach)
+        return 1.0 / float(np.linalg.norm(inverse, 2))
 
     def __repr__(self) -> str:
         return f"WrenchSpace({len(self.contacts)} contacts, Q_{self.edges} = {self.quality:.6g})"
 
 
-def _tangents(normals: Floats) -> tuple[Floats, Floats]:
-    """R(n) e₁ and R(n) e₂; see docs/conventions.md."""
-    x, y, z = normals.T
-    planar = x * x + y * y
-    flipped = (z < 0) & (planar < np.finfo(float).tiny)
-    # 1 + z cancels near −e₃; there it is (x² + y²)/(1 − z).
-    with np.errstate(divide="ignore", invalid="ignore"):
-        k = np.where(z > 0, 1.0 / (1.0 + z), (1.0 - z) / planar)
-        first = np.stack([1.0 - k * x * x, -k * x * y, -x], axis=1)
-        second = np.stack([-k * x * y, 1.0 - k * y * y, -y], axis=1)
-    first[flipped] = [1.0, 0.0, 0.0]
-    second[flipped] = [0.0, -1.0, 0.0]
-    return first, second
+def _space(*key: Any) -> WrenchSpace:
+    """A wrench space from what makes it, for copies and pickles."""
+    contacts, normals, center, friction, edges, torsion, length_scale = key
+    return WrenchSpace(
+        contacts,
+        normals,
+        center,
+        friction=friction,
+        edges=edges,
+        torsion=torsion,
+        length_scale=length_scale,
+    )
 
 
 def _cross(r: Floats) -> Floats:

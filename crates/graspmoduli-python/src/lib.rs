@@ -4,19 +4,18 @@
 mod domain;
 mod math;
 mod pool;
+mod quality;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
-use graspmoduli::contact::{Contact, FrictionCone};
+use graspmoduli::contact::FrictionCone;
 use graspmoduli::distance;
 use graspmoduli::error::Error;
-use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use graspmoduli::search;
 use graspmoduli::synthesis;
 use graspmoduli::transfer::{Carried, Deformation, Schedule};
 use graspmoduli::{sampling, surface};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyReadonlyArrayDyn,
 };
 use pool::detached;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -38,34 +37,17 @@ fn vectors(values: &[f64]) -> &[[f64; 3]] {
     values.as_chunks().0
 }
 
-fn batch<'a>(
-    contacts: &'a PyReadonlyArray3<'_, f64>,
-    normals: &'a PyReadonlyArray3<'_, f64>,
-    center_of_mass: &'a PyReadonlyArray2<'_, f64>,
-) -> PyResult<Batch<'a>> {
-    Ok(Batch {
-        points: vectors(contacts.as_slice()?),
-        normals: vectors(normals.as_slice()?),
-        centers: vectors(center_of_mass.as_slice()?),
-        frictions: &[],
-    })
-}
+/// The friction cones of a call, from a tuple: coefficients, one for all contacts or one each;
+/// edges; torsion.
+#[derive(FromPyObject)]
+pub struct Cone(Vec<f64>, usize, f64);
 
-/// Are all numbers finite and all normals unit to rounding?
-#[pyfunction]
-fn is_clean(
-    points: PyReadonlyArrayDyn<'_, f64>,
-    normals: PyReadonlyArrayDyn<'_, f64>,
-    centers: PyReadonlyArrayDyn<'_, f64>,
-) -> PyResult<bool> {
-    // Without branches this is as fast as memory.
-    let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-    let unit = vectors(normals.as_slice()?)
-        .iter()
-        .fold(true, |all, [x, y, z]| {
-            all & ((x * x + y * y + z * z - 1.0).abs() < 2e-15)
-        });
-    Ok(unit && finite(points.as_slice()?) && finite(centers.as_slice()?))
+impl Cone {
+    fn build(&self) -> PyResult<FrictionCone> {
+        FrictionCone::each(&self.0, self.1)
+            .and_then(|cone| cone.soft(self.2))
+            .map_err(raise)
+    }
 }
 
 /// The friction cone of hard or soft fingers.
@@ -73,143 +55,6 @@ fn cone(friction: f64, edges: usize, torsion: f64) -> PyResult<FrictionCone> {
     FrictionCone::new(friction, edges)
         .and_then(|cone| cone.soft(torsion))
         .map_err(raise)
-}
-
-fn norm(each: bool) -> Norm {
-    if each { Norm::Each } else { Norm::Sum }
-}
-
-/// Exact Q_l of n grasps, or Q'_l if `each`.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn quality<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    each: bool,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![0.0; batch.centers.len()];
-    detached(py, || batch.quality(&cone, norm(each), &mut out)).map_err(raise)?;
-    Ok(PyArray1::from_vec(py, out))
-}
-
-/// Exact Q_l of n grasps and its gradient: per row value, contacts, normals, centre of mass.
-#[pyfunction]
-fn quality_gradient<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let width = Gradient::width(contacts.as_array().shape()[1]);
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![0.0; batch.centers.len() * width];
-    detached(py, || batch.gradient(&cone, &mut out)).map_err(raise)?;
-    PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
-}
-
-/// Whether Q_l ≥ threshold, of n grasps.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn quality_at_least<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    threshold: f64,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![false; batch.centers.len()];
-    detached(py, || batch.is_at_least(&cone, threshold, &mut out)).map_err(raise)?;
-    Ok(PyArray1::from_vec(py, out))
-}
-
-/// Index and Q_l of the best of n grasps, or of the worst.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
-fn extreme_quality(
-    py: Python<'_>,
-    contacts: PyReadonlyArray3<'_, f64>,
-    normals: PyReadonlyArray3<'_, f64>,
-    center_of_mass: PyReadonlyArray2<'_, f64>,
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    largest: bool,
-) -> PyResult<Option<(usize, f64)>> {
-    let cone = cone(friction, edges, torsion)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    detached(py, || {
-        if largest {
-            batch.largest(&cone)
-        } else {
-            batch.smallest(&cone)
-        }
-    })
-    .map_err(raise)
-}
-
-/// Bounds of the quality with circular cones of n grasps.
-#[pyfunction]
-fn circular_quality<'py>(
-    py: Python<'py>,
-    contacts: PyReadonlyArray3<'py, f64>,
-    normals: PyReadonlyArray3<'py, f64>,
-    center_of_mass: PyReadonlyArray2<'py, f64>,
-    friction: f64,
-    tolerance: f64,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = cone(friction, 3, 0.0)?;
-    let batch = batch(&contacts, &normals, &center_of_mass)?;
-    let mut out = vec![[0.0; 2]; batch.centers.len()];
-    detached(py, || batch.circular(&cone, tolerance, &mut out)).map_err(raise)?;
-    table(py, out)
-}
-
-/// Q_l or Q'_l of one grasp by the expanding polytope, and the normal of the nearest facet.
-#[pyfunction]
-fn weakest(
-    contacts: PyReadonlyArray2<'_, f64>,
-    normals: PyReadonlyArray2<'_, f64>,
-    center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
-    torsion: f64,
-    each: bool,
-) -> PyResult<(f64, [f64; 6])> {
-    let cone = cone(friction, edges, torsion)?;
-    let contacts = single(&contacts, &normals)?;
-    let weakest = Evaluator::new(&cone).weakest(&contacts, center_of_mass.into(), norm(each));
-    Ok((weakest.quality, weakest.direction))
-}
-
-/// The contacts of one grasp.
-fn single(
-    contacts: &PyReadonlyArray2<'_, f64>,
-    normals: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<Vec<Contact>> {
-    Ok(vectors(contacts.as_slice()?)
-        .iter()
-        .zip(vectors(normals.as_slice()?))
-        .map(|(&point, &normal)| Contact {
-            point: point.into(),
-            normal: normal.into(),
-        })
-        .collect())
 }
 
 /// Rows of equal length as an array.
@@ -270,7 +115,7 @@ impl Surface {
                 r.value, r.slope[0], r.slope[1], r.bend[0], r.bend[1], r.bend[2],
             ]
         });
-        table(py, rows.collect())
+        table(py, py.detach(|| rows.collect()))
     }
 
     /// Per (u, θ): point, normal, t₁, t₂, n_u, n_θ, c_uu, c_uθ, c_θθ.
@@ -294,7 +139,7 @@ impl Surface {
             }
             row
         });
-        table(py, rows.collect())
+        table(py, py.detach(|| rows.collect()))
     }
 
     /// Area, centre of mass, volume, centre of mass of the solid; by Simpson's rule if `steps`.
@@ -312,12 +157,12 @@ impl Surface {
         )
     }
 
-    fn radius_about(&self, center: [f64; 3]) -> f64 {
-        self.0.radius_about(center.into(), 64)
+    fn radius_about(&self, py: Python<'_>, center: [f64; 3]) -> f64 {
+        py.detach(|| self.0.radius_about(center.into(), 64))
     }
 
-    fn project(&self) -> Self {
-        Self(self.0.project())
+    fn project(&self, py: Python<'_>) -> Self {
+        Self(py.detach(|| self.0.project()))
     }
 }
 
@@ -351,16 +196,20 @@ fn best_subsets<'py>(
     py: Python<'py>,
     contacts: PyReadonlyArray2<'py, f64>,
     normals: PyReadonlyArray2<'py, f64>,
+    frictions: Option<PyReadonlyArray1<'py, f64>>,
     center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
+    cone: Cone,
     size: usize,
     top: usize,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<(Vec<usize>, f64)>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
-    let contacts = single(&contacts, &normals)?;
+    let cone = cone.build()?;
+    let frictions = match &frictions {
+        Some(each) => each.as_slice()?,
+        None => &[],
+    };
+    let contacts = quality::contacts(vectors(contacts.as_slice()?), vectors(normals.as_slice()?));
     let mut failure = None;
     let result = py.detach(|| {
         let report = |done, total| {
@@ -379,7 +228,9 @@ fn best_subsets<'py>(
             }
         };
         let center = center_of_mass.into();
-        search::best_subsets(&contacts, &[], center, &cone, size, top, threads, report)
+        search::best_subsets(
+            &contacts, frictions, center, &cone, size, top, threads, report,
+        )
     });
     match (result, failure) {
         (Ok(ranked), _) => Ok(ranked.into_iter().map(|r| (r.indices, r.quality)).collect()),
@@ -396,14 +247,13 @@ fn synthesize<'py>(
     py: Python<'py>,
     surface: &Surface,
     center_of_mass: [f64; 3],
-    friction: f64,
-    edges: usize,
+    cone: Cone,
     top: usize,
     starts: usize,
     square: PyReadonlyArray2<'py, f64>,
     allowed: Option<PyReadonlyArray2<'py, bool>>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let cone = FrictionCone::new(friction, edges).map_err(raise)?;
+    let cone = cone.build()?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
     let found = detached(py, || {
@@ -474,11 +324,10 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         samples: usize,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
         let carried = detached(py, || self.0.naive(&grasps, &cone, samples));
         transferred(py, carried)
@@ -490,14 +339,13 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         surfaces: usize,
         steps: usize,
         length: f64,
         difference: Option<f64>,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
         let schedule = Schedule {
             surfaces,
@@ -515,11 +363,10 @@ impl PyDeformation {
         &self,
         py: Python<'py>,
         grasps: PyReadonlyArray3<'py, f64>,
-        friction: f64,
-        edges: usize,
+        cone: Cone,
         allowed: Option<PyReadonlyArray2<'py, bool>>,
     ) -> PyResult<Vec<Transferred<'py>>> {
-        let cone = cone(friction, edges, 0.0)?;
+        let cone = cone.build()?;
         let grasps: Vec<_> = coordinates(&grasps)?
             .iter()
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
@@ -562,9 +409,13 @@ mod _core {
     #[pymodule_export]
     use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
     #[pymodule_export]
+    use super::quality::{
+        circular_quality, contact_forces, extreme_quality, is_clean, quality, quality_at_least,
+        quality_gradient, quality_of_one, tangents, weakest,
+    };
+    #[pymodule_export]
     use super::{
-        GraspModuliError, PyDeformation, Surface, best_subsets, circular_quality, combine,
-        extreme_quality, is_clean, quality, quality_at_least, quality_gradient, sample_points,
-        surface_distance, synthesize, weakest,
+        GraspModuliError, PyDeformation, Surface, best_subsets, combine, sample_points,
+        surface_distance, synthesize,
     };
 }

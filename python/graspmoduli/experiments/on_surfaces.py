@@ -15,6 +15,7 @@ from ..grasps import Grasp, place
 from ..guarantees import certified_radius
 from ..moduli import placed_distance, sample_combinations, sample_weights, surface_distance
 from ..plotting import ELEVATION, LINES, plot_path, plot_row, plot_simplex
+from ..quality import quality
 from ..sampling import sample_points
 from ..shapes import MODELS, NAMES
 from ..surfaces import Surface, combine, project
@@ -85,7 +86,7 @@ def fig8_piece(index: int, scale: Scale) -> dict[str, Any]:
                 at = place(target, shifted)
                 cases.append(
                     {
-                        "quality": at.quality(friction=scale.friction, edges=scale.edges),
+                        "quality": quality(at, friction=scale.friction, edges=scale.edges),
                         "distance": placed_distance(placed, at),
                         "grasp": listed(shifted),
                         # How far towards which surface.
