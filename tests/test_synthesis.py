@@ -215,7 +215,7 @@ class TestSynthesis:
             found = gm.synthesize(surface, friction=friction)
             for ranked in found:
                 placed = gm.place(surface, ranked.grasp)
-                assert ranked.quality == pytest.approx(placed.quality(friction=friction)) != 0.0
+                assert ranked.quality == pytest.approx(gm.quality(placed, friction=friction)) != 0.0
             best.append(found[0].quality if found else 0.0)
         assert best == sorted(best)
         assert best[1] > 0.0
