@@ -457,7 +457,7 @@ impl Region for Cells<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Contact, Frame, FrictionCone};
+    use crate::contact::FrictionCone;
     use crate::nnls::nonnegative;
 
     fn bumpy(bump: f64) -> Surface {
@@ -471,39 +471,15 @@ mod tests {
         Surface::new(-0.6, 0.7, columns, coefficients).unwrap()
     }
 
-    /// How many wrenches touch the facet with this x, ⟨x, w⟩ ≤ 1; the edges of one cone can make up
-    /// three of six, however many they are.
-    fn touching(
-        contacts: &[Contact; 3],
-        center: DVec3,
-        cone: &FrictionCone,
-        x: &[f64; 6],
-    ) -> usize {
-        let v = DVec3::new(x[0], x[1], x[2]);
-        let omega = DVec3::new(x[3], x[4], x[5]);
-        contacts
-            .iter()
-            .map(|contact| {
-                let frame = Frame::new(contact.normal);
-                let velocity = v + omega.cross(contact.point - center);
-                (0..cone.len())
-                    .filter(|&j| cone.edge(&frame, j).dot(velocity) > 1.0 - 1e-9)
-                    .count()
-                    .min(3)
-            })
-            .sum()
-    }
-
     /// The slow twin of the end of an ascent: 0 is a convex combination of the gradients of all
-    /// facets that touch the ball of radius Q, and of the normals of the constraints on u. A facet
-    /// with six wrenches has one gradient; with more it has another on each side of the kink.
+    /// facets that touch the ball of radius Q, and of the normals of the constraints on u. Where a
+    /// wrench crosses such a facet that is not enough: nothing close by is better either.
     #[test]
     fn an_ascent_ends_where_the_generalised_gradient_holds_zero() {
         let cone = FrictionCone::new(1.0, 8).unwrap();
         let mut evaluator = Evaluator::new(&cone);
         let mut ends = 0;
         let mut at_an_end_of_the_surface = 0;
-        let mut with_one_gradient_each = 0;
         for bump in [0.0, 0.05, 0.1, 0.2] {
             let surface = bumpy(bump);
             let center = surface.integrals().center_of_mass;
@@ -520,34 +496,20 @@ mod tests {
                     continue;
                 };
                 ends += 1;
-                let contacts = at.map(|[u, theta]| surface.contact(u, theta));
                 let near = (1.0 + 1e-6) * quality;
-                let most_touching = evaluator
-                    .kernel
-                    .within(&contacts, center, near, 64)
-                    .unwrap()
-                    .iter()
-                    .map(|vertex| touching(&contacts, center, &cone, &vertex.twist))
-                    .max();
-                if most_touching != Some(6) {
-                    // Q may have a kink that no one gradient tells of: try what lies around.
-                    for hop in 0..3000 {
-                        let size = 10f64.powf(-8.0 + 6.0 * f64::from(hop % 100) / 100.0);
-                        let step = std::array::from_fn(|i| {
-                            size * (f64::from(hop * (2 * i as i32 + 3)) * 0.618_034 + i as f64)
-                                .sin()
-                        });
-                        let there = climber.moved(&at, &step);
-                        let contacts = there.map(|[u, theta]| surface.contact(u, theta));
-                        let around = evaluator.quality(&contacts, center);
-                        assert!(
-                            around <= quality * (1.0 + 1e-6),
-                            "{bump} {k} {around} {quality}"
-                        );
-                    }
-                    continue;
+                for hop in 0..3000 {
+                    let size = 10f64.powf(-8.0 + 6.0 * f64::from(hop % 100) / 100.0);
+                    let step = std::array::from_fn(|i| {
+                        size * (f64::from(hop * (2 * i as i32 + 3)) * 0.618_034 + i as f64).sin()
+                    });
+                    let there = climber.moved(&at, &step);
+                    let contacts = there.map(|[u, theta]| surface.contact(u, theta));
+                    let around = evaluator.quality(&contacts, center);
+                    assert!(
+                        around <= quality * (1.0 + 1e-6),
+                        "{bump} {k} {around} {quality}"
+                    );
                 }
-                with_one_gradient_each += 1;
                 let model = climber.model(&mut evaluator, at, Some(near), 0.0).unwrap();
                 let steepest = model
                     .facets
@@ -580,10 +542,6 @@ mod tests {
             }
         }
         assert!(ends >= 24 && at_an_end_of_the_surface >= 6);
-        assert!(
-            with_one_gradient_each * 10 >= ends * 9,
-            "{with_one_gradient_each} {ends}"
-        );
     }
 
     #[test]
