@@ -142,12 +142,17 @@ class TestSearch:
             gm.best_grasps(surface, [0.1, 0.5], [0, 2])
 
 
-def _same_grasps(one, two):
-    """The same in the same order; where Q is flat the place is less certain than the quality."""
+def _same_grasps(one, two, turns=1):
+    """The same in the same order; where Q is flat the place is less certain than the quality.
+
+    On a surface of revolution a grasp may come turned by an eighth: the friction cones' eight edges
+    turn with it, so that is the same but for rounding, and no start is better than another.
+    """
     assert len(one) == len(two) > 0
     for a, b in zip(one, two, strict=True):
         assert a.quality == pytest.approx(b.quality, rel=1e-8)
-        turn = (a.grasp.theta - b.grasp.theta + np.pi) % (2 * np.pi) - np.pi
+        by = 2 * np.pi / turns * np.round((a.grasp.theta - b.grasp.theta)[0] / (2 * np.pi / turns))
+        turn = (a.grasp.theta - b.grasp.theta - by + np.pi) % (2 * np.pi) - np.pi
         assert np.abs([a.grasp.u - b.grasp.u, turn]).max() < 1e-4
 
 
@@ -204,7 +209,8 @@ class TestSynthesis:
         other = gm.Surface.from_coefficients(
             surface.coefficients * noise, surface.bottom, surface.top
         )
-        _same_grasps(gm.synthesize(surface), gm.synthesize(other))
+        turns = 1 if name in NOT_ROUND else 8
+        _same_grasps(gm.synthesize(surface), gm.synthesize(other), turns)
 
     @pytest.mark.parametrize("path", sorted(OBJECTS.glob("*.ply")), ids=lambda path: path.stem)
     def test_nor_do_the_last_bits_of_a_fit(self, path):
