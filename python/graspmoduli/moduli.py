@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -180,6 +180,9 @@ def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     )
 
 
+_D = TypeVar("_D", bound="Distance")
+
+
 class Distance(float):
     """A distance with a proven error bound: the true one is at most ``error`` larger.
 
@@ -189,9 +192,9 @@ class Distance(float):
     __slots__ = ("error",)
     error: float
 
-    def __new__(cls, value: float, error: float) -> Distance:
+    def __new__(cls: type[_D], value: float, error: float) -> _D:
         """As :func:`distance` makes it."""
-        self = super().__new__(cls, value)
+        self = float.__new__(cls, value)
         object.__setattr__(self, "error", float(error))
         return self
 
@@ -201,10 +204,10 @@ class Distance(float):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (float(self), self.error)
 
-    def __copy__(self) -> Distance:
+    def __copy__(self: _D) -> _D:
         return self
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Distance:
+    def __deepcopy__(self: _D, memo: dict[int, Any]) -> _D:
         return self
 
 

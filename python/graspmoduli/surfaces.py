@@ -224,7 +224,9 @@ class Surface:
     # Points -------------------------------------------------------------------------------
 
     @overload
-    def radius(self, u: float, theta: float) -> float: ...
+    def radius(  # pyright: ignore[reportOverlappingOverload]: numbers are arrays, too
+        self, u: float, theta: float
+    ) -> float: ...
     @overload
     def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats: ...
     def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats | float:
