@@ -17,7 +17,7 @@ use graspmoduli::{sampling, surface};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };
-use pool::detached;
+use pool::{detached, interruptible};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -256,7 +256,7 @@ fn synthesize<'py>(
     let cone = cone.build()?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
-    let found = detached(py, || {
+    let found = interruptible(py, |stop| {
         synthesis::synthesize(
             &surface.0,
             center_of_mass.into(),
@@ -265,9 +265,10 @@ fn synthesize<'py>(
             top,
             starts,
             square,
+            stop,
         )
-    });
-    let rows = found.map_err(raise)?.into_iter().map(|grasp| {
+    })?;
+    let rows = found.into_iter().map(|grasp| {
         let [[u1, t1], [u2, t2], [u3, t3]] = grasp.coordinates;
         [u1, t1, u2, t2, u3, t3, grasp.quality]
     });
@@ -329,7 +330,7 @@ impl PyDeformation {
     ) -> PyResult<Vec<Transferred<'py>>> {
         let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
-        let carried = detached(py, || self.0.naive(&grasps, &cone, samples));
+        let carried = interruptible(py, |stop| self.0.naive(&grasps, &cone, samples, stop))?;
         transferred(py, carried)
     }
 
@@ -353,7 +354,9 @@ impl PyDeformation {
             length,
             difference,
         };
-        let carried = detached(py, || self.0.by_gradient(&grasps, &cone, schedule));
+        let carried = interruptible(py, |stop| {
+            self.0.by_gradient(&grasps, &cone, schedule, stop)
+        })?;
         transferred(py, carried)
     }
 
@@ -372,9 +375,10 @@ impl PyDeformation {
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
             .collect();
         let cells = cells(allowed.as_ref())?;
-        let carried = detached(py, || {
-            self.0.by_ascent(&grasps, &cone, region(cells.as_ref()))
-        });
+        let carried = interruptible(py, |stop| {
+            let region = region(cells.as_ref());
+            self.0.by_ascent(&grasps, &cone, region, stop)
+        })?;
         transferred(py, carried)
     }
 }
