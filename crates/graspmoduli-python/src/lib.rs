@@ -21,6 +21,7 @@ use pool::{detached, interruptible};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
 
 pyo3::create_exception!(
     graspmoduli,
@@ -184,7 +185,22 @@ fn sample_points<'py>(
     square: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let square = square.as_slice()?.as_chunks().0;
-    let points = detached(py, || sampling::by_area(&surface.0, square));
+    /// Points between two looks at the signals.
+    const PIECE: usize = 1 << 14;
+    if square.len() <= PIECE {
+        let points = detached(py, || sampling::by_area(&surface.0, square));
+        return table(py, points);
+    }
+    let points = interruptible(py, |stop| {
+        let mut points = Vec::with_capacity(square.len());
+        for piece in square.chunks(PIECE) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            points.extend(sampling::by_area(&surface.0, piece));
+        }
+        Ok(points)
+    })?;
     table(py, points)
 }
 
