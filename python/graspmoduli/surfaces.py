@@ -448,7 +448,8 @@ class Surface:
             ) from None
         except Exception as error:
             raise GraspModuliError(
-                f"path must be a file written by Surface.save, got {brief(path)} ({brief(str(error))})"
+                "path must be a file written by Surface.save, "
+                f"got {brief(path)} ({brief(str(error))})"
             ) from None
         return cls.from_coefficients(*parts)
 
