@@ -117,8 +117,8 @@ def quality(
     where no sign hangs on rounding. All else goes by an expanding polytope, several times slower
     for four contacts and a hundred times for eight. "Not in its interior" means for both: in units
     of forces and of torques about the contacts' centroid over the longest distance from it, the
-    hull reaches no farther than 1e-12 beyond some plane through the origin. The order of the
-    contacts does not change a bit of Q.
+    hull reaches no farther than 1e-12 beyond some plane through the origin (or no farther than
+    1e-8, where rounding leaves it open). The order of the contacts does not change a bit of Q.
 
     Examples
     --------

@@ -97,13 +97,19 @@ impl FrictionCone {
         }
     }
 
-    /// Friction coefficient μ of a contact.
+    /// Friction coefficient μ of a contact; that of the last, if there are fewer coefficients.
     #[inline]
     pub fn friction(&self, contact: usize) -> f64 {
-        if let [all] = self.frictions[..] {
-            return all;
+        self.frictions[contact.min(self.frictions.len() - 1)]
+    }
+
+    /// The same cones with the least of the friction coefficients for all contacts.
+    pub(crate) fn least_friction(&self) -> Self {
+        let least = self.frictions.iter().copied().fold(f64::INFINITY, f64::min);
+        Self {
+            frictions: vec![least],
+            ..self.clone()
         }
-        self.frictions[contact]
     }
 
     /// Have all contacts the same friction?

@@ -160,13 +160,14 @@ impl Drop for Leave<'_> {
 /// The same for some triples only, in the order in which they are worth trying; on this thread.
 pub(crate) fn best_of(
     contacts: &[Contact],
+    frictions: &[f64],
     center_of_mass: DVec3,
     cone: &FrictionCone,
     top: usize,
     triples: impl Iterator<Item = [usize; 3]>,
 ) -> Vec<Ranked> {
     let board = Board::new(top);
-    let mut worker = Worker::new(contacts, &[], center_of_mass, cone, 3, &board);
+    let mut worker = Worker::new(contacts, frictions, center_of_mass, cone, 3, &board);
     for mut triple in triples {
         if worker.may_enter(&triple) {
             worker.evaluate(&mut triple);

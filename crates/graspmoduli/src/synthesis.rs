@@ -61,7 +61,8 @@ pub struct Synthesized {
 }
 
 /// The `top` best grasps found, best first, equal ones in the order of their contacts, no two at the
-/// same place. Contacts come in ascending order of u.
+/// same place. Contacts come in ascending order of u, or, where the cone has friction for each of
+/// them, in its order.
 ///
 /// At most `most_starts` grasps of the heuristic are followed.
 /// If the deformation from π(S) finds fewer than three grasps, the ascent also starts from the best
@@ -157,7 +158,7 @@ fn within_pool(
             &contacts,
             &[],
             center_of_mass,
-            cone,
+            &cone.least_friction(),
             3,
             top.saturating_mul(8).min(triples_of(contacts.len())),
             1,
@@ -208,7 +209,8 @@ fn within_pool(
     Ok(best
         .into_iter()
         .map(|(at, _)| {
-            let coordinates = in_order(at);
+            // Fingers with friction of their own keep their numbers.
+            let coordinates = if cone.is_uniform() { in_order(at) } else { at };
             let contacts = coordinates.map(|[u, theta]| surface.contact(u, theta));
             Synthesized {
                 coordinates,
@@ -249,8 +251,16 @@ fn starts(target: &Climber, cone: &FrictionCone, most: usize) -> Vec<Coordinates
     }
     let round = target.surface.project();
     let center = round.integrals_by_simpson(20).center_of_mass;
-    // Angles of the three contacts; the second and third are interchangeable.
-    let arrangements = [[0.0, PI, PI], [0.0, TAU / 3.0, 2.0 * TAU / 3.0]];
+    // Angles of the three contacts; the second and third are interchangeable. Where fingers have
+    // friction of their own it matters which of them is where.
+    let mut arrangements = vec![[0.0, PI, PI], [0.0, TAU / 3.0, 2.0 * TAU / 3.0]];
+    if !cone.is_uniform() {
+        arrangements.extend([
+            [PI, 0.0, PI],
+            [PI, PI, 0.0],
+            [0.0, 2.0 * TAU / 3.0, TAU / 3.0],
+        ]);
+    }
     let turned: Vec<Vec<Found>> = arrangements
         .par_iter()
         .map(|angles| {
@@ -290,16 +300,24 @@ fn best_heights(
         .flat_map(|theta| (0..HEIGHTS).map(move |i| round.contact(height(i), theta)))
         .collect();
     // Three fingers evenly around can be numbered by height.
-    let wanted = |&[a, b, c]: &[usize; 3]| if together { b < c } else { a <= b && b <= c };
+    let alike = cone.is_uniform();
+    let wanted = |&[a, b, c]: &[usize; 3]| match (alike, together) {
+        (false, _) => true,
+        (true, true) => b < c,
+        (true, false) => a <= b && b <= c,
+    };
+    let own = if alike { 0 } else { contacts.len() };
+    let frictions: Vec<f64> = (0..own).map(|i| cone.friction(i / HEIGHTS)).collect();
     // From the middle heights outward: the best are there, and raise the bar for the others.
     let triples = outward()
         .flat_map(|a| outward().flat_map(move |b| outward().map(move |c| [a, b, c])))
         .filter(wanted)
         .map(|[a, b, c]| [a, HEIGHTS + b, 2 * HEIGHTS + c]);
-    let mut found: Vec<([usize; 3], f64)> = best_of(&contacts, center, cone, 3 * most, triples)
-        .iter()
-        .map(|ranked| (three(ranked).map(|i| i % HEIGHTS), ranked.quality))
-        .collect();
+    let mut found: Vec<([usize; 3], f64)> =
+        best_of(&contacts, &frictions, center, cone, 3 * most, triples)
+            .iter()
+            .map(|ranked| (three(ranked).map(|i| i % HEIGHTS), ranked.quality))
+            .collect();
     equals_by(&mut found, |levels| *levels);
     let mut best: Best<[f64; 3]> = Best::new(most);
     for (levels, quality) in found {

@@ -312,3 +312,24 @@ fn a_stop_is_heard() {
     let carried = way.by_ascent(&[at], &cone(), &Anywhere, &stop);
     assert_eq!(carried, Err(Error::Interrupted));
 }
+
+#[test]
+fn fingers_with_friction_of_their_own_keep_their_numbers() {
+    let surface = surface(0.8, 0.15, 1, 0.0);
+    let center = surface.integrals().center_of_mass;
+    for frictions in [[0.3, 0.9, 0.9], [0.9, 0.9, 0.3], [0.7, 0.7, 0.7]] {
+        let cone = FrictionCone::each(&frictions, 8).unwrap();
+        let found = synthesize(&surface, center, &cone, &Anywhere, 3, 12, &square(), &GO).unwrap();
+        assert!(!found.is_empty());
+        for grasp in found {
+            let contacts = grasp
+                .coordinates
+                .map(|[u, theta]| surface.contact(u, theta));
+            let quality = Evaluator::new(&cone).quality(&contacts, center);
+            assert_eq!(quality, grasp.quality);
+            // As good as any other way to share out the fingers' places.
+            let swapped = [contacts[1], contacts[0], contacts[2]];
+            assert!(Evaluator::new(&cone).quality(&swapped, center) <= 1.05 * quality);
+        }
+    }
+}

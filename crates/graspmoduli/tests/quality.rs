@@ -431,3 +431,72 @@ fn batches_agree_with_single_grasps() {
     many.gradient(&cone, &mut gradients).unwrap();
     assert!(gradients.chunks(width).all(|row| row[0] == out[0]));
 }
+
+#[test]
+fn nearly_collinear_grasps_are_answered() {
+    let mut state = 3u64;
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut positive = 0;
+    for m in [3, 4] {
+        for off in [1e-8, 1e-9, 1e-10, 1e-11, 3e-12, 1e-12, 1e-13] {
+            for _ in 0..500 {
+                let mut vector = || DVec3::new(draw(), draw(), draw());
+                let (a, b) = (vector(), vector());
+                let contacts: Vec<Contact> = (0..m)
+                    .map(|_| Contact {
+                        point: a + (b - a) * vector().x + vector() * off,
+                        normal: vector().normalize(),
+                    })
+                    .collect();
+                let mut evaluator = Evaluator::new(&FrictionCone::new(1.0, 8).unwrap());
+                let quality = evaluator.quality(&contacts, DVec3::ZERO);
+                let unconverged = evaluator.take_unconverged();
+                assert!(unconverged.is_none(), "{off} {unconverged:?} {contacts:?}");
+                positive += usize::from(quality > 0.0);
+                // No farther than the contacts are off the line.
+                assert!(quality < 100.0 * off, "{off} {quality}");
+            }
+        }
+    }
+    assert!(positive > 1000, "{positive}");
+}
+
+#[test]
+fn any_friction_and_many_edges_are_answered() {
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / 5.0;
+    for m in [3, 4, 5] {
+        let contacts: Vec<Contact> = (0..m)
+            .map(|i| {
+                let point = DVec3::new(angle(i).cos(), angle(i).sin(), 0.1 * i as f64);
+                Contact {
+                    point,
+                    normal: -point.normalize(),
+                }
+            })
+            .collect();
+        for friction in [1e-6, 1e-3, 0.3, 3.0, 10.0, 100.0, 1e4, 1e5, 1e6] {
+            for l in [3, 8, 40, 4096] {
+                if l > 40 && friction > 1e4 {
+                    continue;
+                }
+                let cone = FrictionCone::new(friction, l).unwrap();
+                let mut evaluator = Evaluator::new(&cone);
+                let quality = evaluator.quality(&contacts, DVec3::ZERO);
+                assert!(evaluator.take_unconverged().is_none(), "{m} {friction} {l}");
+                assert!(
+                    quality <= 2.0 * (1.0 + friction),
+                    "{m} {friction} {l} {quality}"
+                );
+                if l < 40 {
+                    evaluator.quality_of_each(&contacts, DVec3::ZERO);
+                    assert!(evaluator.take_unconverged().is_none(), "{m} {friction} {l}");
+                }
+            }
+        }
+    }
+}

@@ -16,7 +16,7 @@
 //! is not flat, and then with other, larger ε_p.
 
 use super::r6::{Twist, dot, solve, unit};
-use super::surround::{BOUNDARY, Basis, Position, Simplex, surround};
+use super::surround::{BOUNDARY, Coordinates, Own, Position, Simplex, UNCLEAR_BOUNDARY, surround};
 use super::wrenches::Reference;
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -29,6 +29,8 @@ pub(super) trait Support {
     /// A point in the interior of the hull, relative to its dimension, in general position; other
     /// levels give another.
     fn inside(&self, levels: Levels) -> Twist;
+    /// About how far the hull reaches from the origin; not less.
+    fn size(&self) -> f64;
 }
 
 /// The levels 1 + ε_p at which points count.
@@ -55,8 +57,8 @@ impl Levels {
 
 /// The perturbations ε that are tried, one after the other.
 const EPSILONS: [f64; 6] = [1e-9, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
-/// The largest error of a value, in units of forces and of torques over the longest lever arm,
-/// that a perturbation may bring with it; a value with a larger one has not converged.
+/// The largest error of a value, relative to the longest wrench, that a perturbation may bring with
+/// it; a value with a larger one has not converged.
 pub(crate) const LARGEST_ERROR: f64 = 1e-8;
 /// Slots of the table of ridges: free, and met twice.
 const EMPTY: u32 = u32::MAX;
@@ -162,39 +164,6 @@ impl Metric {
     }
 }
 
-/// Coordinates in which an expansion takes place.
-trait Coordinates {
-    /// A polar vertex in the hull's own coordinates, in which lengths are measured.
-    fn own(&self, x: &Twist) -> Twist;
-    /// A point of the hull in these coordinates.
-    fn point(&self, point: &Twist) -> Twist;
-}
-
-/// The hull's own.
-struct Own;
-
-impl Coordinates for Own {
-    #[inline(always)]
-    fn own(&self, x: &Twist) -> Twist {
-        *x
-    }
-
-    #[inline(always)]
-    fn point(&self, point: &Twist) -> Twist {
-        *point
-    }
-}
-
-impl Coordinates for Basis {
-    fn own(&self, x: &Twist) -> Twist {
-        self.of_axes(x)
-    }
-
-    fn point(&self, point: &Twist) -> Twist {
-        self.to_axes(point)
-    }
-}
-
 #[derive(Debug, Clone, Copy)]
 struct Facet {
     x: Twist,
@@ -251,6 +220,8 @@ struct Expansion<'a, S, E> {
     metric: Metric,
     levels: Levels,
     best: &'a mut Distance,
+    /// How far the hull reaches in the direction in which it reaches least, of those looked at.
+    flattest: &'a mut (f64, Twist),
     enough: &'a mut E,
 }
 
@@ -274,25 +245,35 @@ impl Polytope {
                 epsilon,
                 salt: attempt << 48,
             };
-            let basis = match surround(support, levels) {
-                Some(Position::Separated(x)) => return Distance::zero(x),
-                Some(Position::Surrounded(basis)) => basis,
-                None => continue,
+            let found = match surround(support, levels, &Own) {
+                Position::Unclear(basis) => (surround(support, levels, &*basis), Some(basis)),
+                found => (found, None),
             };
+            let (basis, coordinates) = match found {
+                (Position::Separated(x), _) => return Distance::zero(x),
+                (Position::Surrounded(basis), coordinates) => (basis, coordinates),
+                (Position::Unclear(_), _) => continue,
+            };
+            let mut flattest = (f64::INFINITY, [0.0; 6]);
             let mut expansion = Expansion {
+                flattest: &mut flattest,
                 support,
                 metric,
                 levels,
                 best: &mut best,
                 enough: &mut enough,
             };
-            let plain = self.expand(basis.simplex(), &Own, &mut expansion);
-            if plain.is_ok()
-                || self
-                    .expand(basis.simplex_of_axes(), &basis, &mut expansion)
-                    .is_ok()
-            {
+            let expanded = match coordinates {
+                None => self
+                    .expand(basis.simplex(), &Own, &mut expansion)
+                    .or_else(|_| self.expand(basis.simplex_of_axes(), &*basis, &mut expansion)),
+                Some(flat) => self.expand(basis.simplex(), &*flat, &mut expansion),
+            };
+            if expanded.is_ok() {
                 return best;
+            }
+            if flattest.0 <= UNCLEAR_BOUNDARY {
+                return Distance::zero(flattest.1);
             }
         }
         best.lower = best.lower.min(best.upper);
@@ -311,6 +292,7 @@ impl Polytope {
             metric,
             levels,
             best,
+            flattest,
             enough,
         } = expansion;
         let metric = *metric;
@@ -334,13 +316,16 @@ impl Polytope {
                 return Ok(());
             }
             best.take(height, &x, metric);
+            if height / real < flattest.0 {
+                **flattest = (height / real, x.map(|c| c / real));
+            }
             let level = levels.of(key);
             let point = coordinates.point(&point);
             let over = dot(&facet.x, &point) - level;
             let rounding = ROUNDING * dot(&facet.x, &facet.x).sqrt();
             if over <= rounding.max(0.01 * epsilon) {
                 // What the perturbation may have hidden.
-                if epsilon / real > LARGEST_ERROR {
+                if epsilon / real > LARGEST_ERROR * support.size() {
                     return Err(Rounding);
                 }
                 self.polish(*support, entry, epsilon, metric, coordinates, best);

@@ -19,18 +19,56 @@ use super::r6::{Twist, add, dot, unit};
 /// the origin in its interior: it is on the boundary. All that this library says of force closure
 /// rests on this number.
 pub(super) const BOUNDARY: f64 = 1e-12;
+/// Where a hull reaches farther than [`BOUNDARY`], but no farther than this, rounding may keep all
+/// methods from an answer. Then, and only then, it counts as on the boundary, too.
+pub(super) const UNCLEAR_BOUNDARY: f64 = 1e-8;
 /// Steps before the method counts as failed; it needs about a dozen.
 const MOST_STEPS: usize = 500;
 /// An entry of a column, relative to the largest, that is too small to divide by.
 const PIVOT: f64 = 1e-11;
 
+/// Coordinates in which a hull is looked at.
+pub(super) trait Coordinates {
+    /// A polar vertex in the hull's own coordinates, in which lengths are measured.
+    fn own(&self, x: &Twist) -> Twist;
+    /// A point of the hull in these coordinates.
+    fn point(&self, point: &Twist) -> Twist;
+}
+
+/// The hull's own.
+pub(super) struct Own;
+
+impl Coordinates for Own {
+    #[inline(always)]
+    fn own(&self, x: &Twist) -> Twist {
+        *x
+    }
+
+    #[inline(always)]
+    fn point(&self, point: &Twist) -> Twist {
+        *point
+    }
+}
+
+impl Coordinates for Basis {
+    fn own(&self, x: &Twist) -> Twist {
+        self.of_axes(x)
+    }
+
+    fn point(&self, point: &Twist) -> Twist {
+        self.to_axes(point)
+    }
+}
+
 /// Where the origin is.
-#[expect(clippy::large_enum_variant, reason = "one at a time, on the stack")]
 pub(super) enum Position {
     /// In the interior of the hull: of the simplex of six of its points and the one inside.
-    Surrounded(Basis),
+    Surrounded(Box<Basis>),
     /// Not in the interior of the hull: a unit x with ⟨x, w⟩ ≤ [`BOUNDARY`] for all its points.
     Separated(Twist),
+    /// Rounding kept the method from an answer; in the coordinates of this basis, in which the hull
+    /// is less flat, it may find one.
+    Unclear(Box<Basis>),
 }
 
 /// Seven points about the origin, and the facets of their simplex by their polar vertices: the x
@@ -42,32 +80,48 @@ pub(super) struct Simplex {
     pub facets: [Twist; 7],
 }
 
-/// `None` where rounding keeps the method from an answer.
-pub(super) fn surround(support: &impl Support, levels: Levels) -> Option<Position> {
-    let inside = support.inside(levels);
+/// Looks at the hull in some coordinates; lengths are those of its own.
+pub(super) fn surround(
+    support: &impl Support,
+    levels: Levels,
+    coordinates: &impl Coordinates,
+) -> Position {
+    let inside = coordinates.point(&support.inside(levels));
     let mut basis = Basis::artificial(&inside.map(|c| -c));
+    let mut flattest = (f64::INFINITY, [0.0; 6]);
     for _ in 0..MOST_STEPS {
         let artificial = basis.artificial > 0;
         let x = basis.polar(|column| match (artificial, column.level) {
             (true, level) => f64::from(level.is_none()),
             (false, level) => level.unwrap_or_default(),
         });
-        let (point, key) = support.farthest(&x);
-        let height = dot(&x, &point);
+        let own = coordinates.own(&x);
+        let (point, key) = support.farthest(&own);
+        let height = dot(&own, &point);
         let level = levels.of(key);
+        let (direction, length) = unit(&own);
+        if height / length < flattest.0 {
+            flattest = (height / length, direction);
+        }
         if artificial {
-            let (direction, length) = unit(&x);
             if height <= BOUNDARY * length {
-                return Some(Position::Separated(direction));
+                return Position::Separated(direction);
             }
         } else if height <= level * (1.0 + 1e-14 * dot(&x, &x).sqrt()) {
             basis.facet = x;
-            let sound = basis.weights.iter().all(|&weight| weight > 0.0);
-            return sound.then_some(Position::Surrounded(basis));
+            if basis.weights.iter().all(|&weight| weight > 0.0) {
+                return Position::Surrounded(Box::new(basis));
+            }
+            break;
         }
-        basis.enter(point, level)?;
+        if basis.enter(coordinates.point(&point), level).is_none() {
+            break;
+        }
     }
-    None
+    if flattest.0 <= UNCLEAR_BOUNDARY {
+        return Position::Separated(flattest.1);
+    }
+    Position::Unclear(Box::new(basis))
 }
 
 #[derive(Debug, Clone, Copy)]

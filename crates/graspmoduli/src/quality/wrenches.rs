@@ -154,6 +154,14 @@ impl Support for Wrenches {
         (sum, key)
     }
 
+    fn size(&self) -> f64 {
+        let longest = |own: &[Twist]| own.iter().map(|w| dot(w, w)).fold(0.0, f64::max).sqrt();
+        match self.norm {
+            Norm::Sum => longest(&self.all),
+            Norm::Each => self.all.chunks_exact(self.per_contact).map(longest).sum(),
+        }
+    }
+
     fn inside(&self, levels: Levels) -> Twist {
         // Of every finger's hull, which has the origin as a corner if each has a limit of its own,
         // and so of their sum; or of the one hull.
@@ -207,6 +215,13 @@ impl Support for Circular<'_> {
             .iter()
             .fold(0u64, |key, c| key.rotate_left(9) ^ c.to_bits());
         (best.0, key)
+    }
+
+    fn size(&self) -> f64 {
+        // Lever arms are at most 1 here.
+        let frictions = self.order.iter().map(|&i| self.cone.friction(i));
+        let steepest = frictions.fold(0.0, f64::max);
+        (2.0 * (1.0 + steepest * steepest)).sqrt()
     }
 
     fn inside(&self, levels: Levels) -> Twist {
