@@ -18,6 +18,7 @@ use pair::{Pair, Patch};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 mod bounds;
 mod cell;
@@ -27,6 +28,9 @@ mod size;
 
 /// Cells looked at before the search ends with the bound that it has.
 const MOST_CELLS: usize = 1 << 20;
+
+/// Cells between two calls of the progress function.
+const CELLS_BETWEEN: usize = 1 << 12;
 
 /// Bounds of second derivatives are computed anew on cells halved up to three times, and then at
 /// every fourth halving up to this one, beyond which derivatives of nets are mostly rounding. In
@@ -76,10 +80,14 @@ impl Best {
 }
 
 /// d(S, S') to a relative error of `tolerance`, or to rounding where that is more.
+///
+/// `progress` is called every few milliseconds; what it answers may end the search with
+/// [`Error::Interrupted`].
 pub fn surface_distance(
     first: &Surface,
     second: &Surface,
     tolerance: f64,
+    mut progress: impl FnMut() -> ControlFlow<()>,
 ) -> Result<SurfaceDistance, Error> {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return Err(Error::Tolerance(tolerance));
@@ -123,6 +131,9 @@ pub fn surface_distance(
         };
         for mut cell in parts.into_iter().flatten() {
             examined += 1;
+            if examined % CELLS_BETWEEN == 0 && progress().is_break() {
+                return Err(Error::Interrupted);
+            }
             match examine(&pair, &mut cell, &mut best) {
                 Outcome::Bounded {
                     bound,
@@ -356,11 +367,15 @@ mod tests {
         Surface::new(-height, height, columns, coefficients).unwrap()
     }
 
+    fn between(first: &Surface, second: &Surface) -> SurfaceDistance {
+        surface_distance(first, second, 1e-6, || ControlFlow::Continue(())).unwrap()
+    }
+
     #[test]
     fn no_point_of_a_fine_grid_is_further_apart_and_some_is_as_far() {
         for seed in 1..12 {
             let (first, second) = (surface(0.6, seed, 7, 8), surface(0.7, seed + 50, 5, 4));
-            let found = surface_distance(&first, &second, 1e-6).unwrap();
+            let found = between(&first, &second);
             assert!(found.error <= 1e-6 * found.value);
             let apart = |u: f64, theta: f64| {
                 let (p, q) = (first.contact(u, theta), second.contact(u, theta));
@@ -388,10 +403,10 @@ mod tests {
                 .map(|(k, c)| c + size * crate::math::sin(k as f64))
                 .collect();
             let second = Surface::new(-0.6, 0.6, 8, moved).unwrap();
-            let found = surface_distance(&first, &second, 1e-6).unwrap();
+            let found = between(&first, &second);
             assert!(found.value > 0.1 * size && found.value < 100.0 * size);
             assert!(found.error <= 1e-6 * found.value);
         }
-        assert_eq!(surface_distance(&first, &first, 1e-6).unwrap().value, 0.0);
+        assert_eq!(between(&first, &first).value, 0.0);
     }
 }
