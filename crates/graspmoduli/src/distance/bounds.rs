@@ -76,7 +76,7 @@ pub fn normals_apart(ranges: [[Range; 3]; 3], heights: [f64; 2]) -> (f64, f64) {
 
 /// How far normals are apart: how far those of two values of X are, and how far all others are from
 /// these.
-pub fn rough_bound(one: [Range; 3], other: [Range; 3], heights: [f64; 2]) -> f64 {
+fn rough_bound(one: [Range; 3], other: [Range; 3], heights: [f64; 2]) -> f64 {
     let mut spread = 0.0;
     let [n, m] = [(one, heights[0]), (other, heights[1])].map(|(ranges, height)| {
         let [f, fu, ft] = ranges;

@@ -10,7 +10,7 @@
 
 use crate::error::Error;
 use crate::surface::Surface;
-use bounds::{FURTHEST, bends, rough_bound};
+use bounds::{FURTHEST, bends, normals_apart};
 use cell::{Cell, Distance, Noise};
 use glam::{DVec2, DVec3};
 use net::ranges_on;
@@ -134,7 +134,7 @@ pub fn surface_distance(
             if examined % CELLS_BETWEEN == 0 && progress().is_break() {
                 return Err(Error::Interrupted);
             }
-            match examine(&pair, &mut cell, &mut best) {
+            match examine(&pair, &mut cell, &mut best, bound) {
                 Outcome::Bounded {
                     bound,
                     noise,
@@ -207,24 +207,25 @@ enum Outcome {
     LargestElsewhere,
 }
 
-/// Bounds a cell after trying its centre and the corner that promises most.
+/// Bounds a cell after trying its centre and the corner that promises most. `known` is a bound for a
+/// larger one.
 ///
 /// Where ‖δ‖ is shown to grow all over the cell in one direction, it is largest on the edge: if
 /// that is an end of the surfaces, only the edge is left, else the largest is beyond it.
-fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best) -> Outcome {
-    let mut rough = f64::INFINITY;
-    if cell.of == Distance::Normals {
-        rough = FURTHEST;
-    }
-    if cell.depth <= DEEPEST && (cell.depth < 4 || cell.depth.is_multiple_of(4)) {
+fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best, known: f64) -> Outcome {
+    let mut rough = known;
+    let regular = cell.depth < 4 || cell.depth.is_multiple_of(4);
+    if cell.of == Distance::Normals && cell.is_rough && cell.depth <= 2 * DEEPEST
+        || regular && cell.depth <= DEEPEST
+    {
         let mut ranges =
             std::array::from_fn(|k| ranges_on(&cell.nets[k], cell.span, cell.net_errors[k]));
         for (ranges, lowest) in ranges.iter_mut().zip(cell.lowest) {
             ranges[0][0].low = ranges[0][0].low.max(lowest);
         }
         if cell.of == Distance::Normals {
-            let [one, other, _] = ranges.map(|r| [r[0][0], r[1][0], r[0][1]]);
-            rough = rough_bound(one, other, pair.heights) + cell.noise.value;
+            let low = ranges.map(|r| [r[0][0], r[1][0], r[0][1]]);
+            rough = rough.min(normals_apart(low, pair.heights).0 + cell.noise.value);
             if rough < best.value {
                 return Outcome::Below(rough);
             }
@@ -252,8 +253,10 @@ fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best) -> Outcome {
         best.improve(pair.difference(cell.of, corner)[0].length(), corner);
     }
     let rounding = longest * 1e-15 + model.noise.value + model.noise.slope.dot(model.half);
+    let close = longest + model.bend() + rounding;
+    cell.is_rough = rough < close;
     Outcome::Bounded {
-        bound: (longest + model.bend() + rounding).min(rough),
+        bound: close.min(rough),
         noise: model.noise.value,
         along_u: model.is_better_halved_along_u(),
     }
