@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, count, floats, locked, number
+from ._arrays import Floats, brief, count, floats, locked, number
 from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp
 from .surfaces import Surface, _what, a_surface, combine, some_surfaces
@@ -236,9 +236,10 @@ def surface_distance(
     """d(S, S') of Sec. III: the supremum of max(‖c_S − c_S'‖, ‖n_S − n_S'‖) over (u, θ).
 
     By branch and bound, so the error is proven, not estimated, and covers rounding. ``tolerance``,
-    from 1e-9 to 1, is the relative error wanted. Look at ``error``: it is larger where no million
-    cells can tell the supremum so well, as for very flat surfaces, and where rounding does not
-    allow it, as for surfaces that are nearly equal.
+    from 1e-9 to 1, is the relative error wanted. Look at ``error``: it is larger where a quarter
+    of a million cells cannot tell the supremum so well, as for surfaces a thousand times flatter
+    than wide, where it can be many times the value, and where rounding does not allow it, as for
+    surfaces that are equal but for their last digits.
     """
     wanted = number("tolerance", tolerance)
     if not 1e-9 <= wanted <= 1.0:
@@ -260,7 +261,7 @@ def distance(start: Point, end: Point, *, angles: str = "chord") -> Distance:
     paper, or by their ``"arc"``.
     """
     if not isinstance(angles, str) or angles not in ANGLES:
-        raise GraspModuliError(f'angles must be "chord" or "arc", got {angles!r}')
+        raise GraspModuliError(f'angles must be "chord" or "arc", got {brief(angles)}')
     (first, g), (last, h) = a_point("start", start), a_point("end", end)
     arc = np.abs(shortest_turn(g, h))
     apart = arc if angles == "arc" else 2.0 * np.sin(0.5 * arc)

@@ -382,7 +382,10 @@ class Surface:
 
     def __truediv__(self, divisor: float) -> Surface:
         d = number("divisor", divisor, positive=True)
-        return Surface.from_coefficients(self.coefficients / d, self.bottom / d, self.top / d)
+        # Lengths that overflow are refused with the others that are too large.
+        with np.errstate(over="ignore"):
+            coefficients = self.coefficients / d
+        return Surface.from_coefficients(coefficients, self.bottom / d, self.top / d)
 
     def __add__(self, other: Surface) -> Surface:
         if not isinstance(other, Surface):

@@ -27,7 +27,7 @@ mod pair;
 mod size;
 
 /// Cells looked at before the search ends with the bound that it has.
-const MOST_CELLS: usize = 1 << 20;
+const MOST_CELLS: usize = 1 << 18;
 
 /// Cells between two calls of the progress function.
 const CELLS_BETWEEN: usize = 1 << 12;
