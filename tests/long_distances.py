@@ -1,4 +1,4 @@
-"""A longer run by hand: ``python tests/long_distances.py [PAIRS] [SEED]`` checks distances of surfaces.
+"""A longer run by hand: ``python tests/long_distances.py [PAIRS] [SEED]`` checks distances.
 
 Pairs of all kinds (of revolution, flat, long, equal, nearly equal, scaled, on any grids, between
 the models) are compared with points of both, computed to fifty digits: none may be further apart
