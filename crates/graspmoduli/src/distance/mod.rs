@@ -10,7 +10,7 @@
 
 use crate::error::Error;
 use crate::surface::Surface;
-use bounds::{FURTHEST, bends, normals_apart};
+use bounds::{bends, normals_apart};
 use cell::{Cell, Distance, Noise};
 use glam::{DVec2, DVec3};
 use net::ranges_on;
