@@ -5,11 +5,14 @@
 
 import copy
 import pickle
+import signal
+import sys
 
 import numpy as np
 import pytest
 
 import graspmoduli as gm
+import long_distances
 
 MODELS = gm.shapes.MODELS
 TAU = 2 * np.pi
@@ -386,3 +389,36 @@ class TestDistance:
         assert gm.distance(p, q) == pytest.approx(0.3 + 2 * np.sin(0.1))
         with pytest.raises(gm.GraspModuliError, match='angles must be "chord" or "arc"'):
             gm.distance(p, q, angles="degrees")
+
+
+def test_distances_are_no_less_than_those_of_points_in_fifty_digits():
+    assert long_distances.main(2 * len(long_distances.KINDS), 1) == 0
+
+
+def test_nearly_equal_flat_surfaces_are_known_to_be_near():
+    # The heights differ by a share of 1e-8; second derivatives of normals are of 1e6.
+    rng = np.random.default_rng(3)
+    c = np.exp(0.1 * rng.normal(size=(8, 8)))
+    first, second = (gm.Surface.from_coefficients(c, 0.0, h) for h in (1e-3, 1e-3 * (1 + 1e-8)))
+    found = gm.surface_distance(first, second, tolerance=1e-3)
+    assert found + found.error < 1e-7
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no timer that sends signals")
+def test_a_long_search_is_interrupted():
+    # All of the curve on which normals turn fastest is equally far: the search takes all its cells.
+    rng = np.random.default_rng(0)
+    c = np.exp(rng.normal(size=(60, 60)))
+    first, second = (gm.Surface.from_coefficients(c, 0.0, h) for h in (1e-3, 1.01e-3))
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.02)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            gm.surface_distance(first, second, tolerance=1e-9)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

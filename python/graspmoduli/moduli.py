@@ -239,9 +239,10 @@ def surface_distance(
     """d(S, S') of Sec. III: the supremum of max(‖c_S − c_S'‖, ‖n_S − n_S'‖) over (u, θ).
 
     By branch and bound, so the error is proven, not estimated, and covers rounding. ``tolerance``,
-    from 1e-9 to 1, is the relative error wanted. Look at ``error``: it is larger where no million
-    cells can tell the supremum so well, as for very flat surfaces, and where rounding does not
-    allow it, as for surfaces that are nearly equal.
+    from 1e-9 to 1, is the relative error wanted. Look at ``error``: it is larger where a quarter
+    of a million cells cannot tell the supremum so well, as for surfaces a thousand times flatter
+    than wide, where it can be many times the value, and where rounding does not allow it, as for
+    surfaces that are equal but for their last digits.
     """
     wanted = number("tolerance", tolerance)
     if not 1e-9 <= wanted <= 1.0:

@@ -373,6 +373,10 @@ class Surface:
         point = floats("center", center)
         if point.shape != (3,):
             raise GraspModuliError(f"center must have shape (3,), got {point.shape}")
+        if (np.abs(point) > FARTHEST).any():
+            raise GraspModuliError(
+                f"center must have coordinates up to {FARTHEST:g}, got {np.abs(point).max():g}"
+            )
         return self._core.radius_about((float(point[0]), float(point[1]), float(point[2])))
 
     # The convex cone ----------------------------------------------------------------------
@@ -384,7 +388,10 @@ class Surface:
 
     def __truediv__(self, divisor: float) -> Surface:
         d = number("divisor", divisor, positive=True)
-        return Surface.from_coefficients(self.coefficients / d, self.bottom / d, self.top / d)
+        # Lengths that overflow are refused with the others that are too large.
+        with np.errstate(over="ignore"):
+            coefficients = self.coefficients / d
+        return Surface.from_coefficients(coefficients, self.bottom / d, self.top / d)
 
     def __add__(self, other: Surface) -> Surface:
         if not isinstance(other, Surface):
@@ -597,7 +604,7 @@ def _caller(radius: Any, arguments: int, of: str, else_: str) -> Callable[..., A
             return radius(*arrays)
         except GraspModuliError:
             raise
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, ArithmeticError) as error:
             raise GraspModuliError(
                 f"{wanted}, got one that raises: {error} (np.vectorize makes functions of numbers "
                 "take arrays)"

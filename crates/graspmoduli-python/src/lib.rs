@@ -314,10 +314,23 @@ fn surface_distance(
     tolerance: f64,
 ) -> PyResult<(f64, f64, [f64; 2])> {
     let (first, second) = (&first.get().0, &second.get().0);
-    let found = py
-        .detach(|| distance::surface_distance(first, second, tolerance))
-        .map_err(raise)?;
-    Ok((found.value, found.error, found.at))
+    let mut failure = None;
+    let result = py.detach(|| {
+        distance::surface_distance(first, second, tolerance, || {
+            match Python::attach(|py| py.check_signals()) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(error) => {
+                    failure = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        })
+    });
+    match (result, failure) {
+        (Ok(found), _) => Ok((found.value, found.error, found.at)),
+        (Err(_), Some(error)) => Err(error),
+        (Err(error), None) => Err(raise(error)),
+    }
 }
 
 /// A grasp carried to another surface: coordinates (m, 2), path (k, 2) of t and Q_l, evaluations.

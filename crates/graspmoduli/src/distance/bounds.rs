@@ -23,6 +23,8 @@ struct Sizes {
     fu: Size,
     ft: Size,
     x: Size,
+    /// Of the cross product of X − X' and any vector between X and X'.
+    across: f64,
     /// A bound of s for all X between those of the two surfaces.
     turning: f64,
 }
@@ -51,6 +53,7 @@ fn sizes([first, second, difference]: [[Range; 3]; 3], heights: [f64; 2]) -> Siz
         change: (one - other).abs() / (one * other),
     };
     let (fu, ft) = (size(1), size(2));
+    let (by_theta, by_u) = (ft * inverse_radius, fu * inverse_height);
     let steep = DVec3::new(
         1.0,
         away(2) / first[0].high.max(second[0].high),
@@ -61,22 +64,28 @@ fn sizes([first, second, difference]: [[Range; 3]; 3], heights: [f64; 2]) -> Siz
         inverse_height,
         fu,
         ft,
-        x: length(ft * inverse_radius, fu * inverse_height),
+        x: length(by_theta, by_u),
+        across: by_theta.largest * by_u.change + by_u.largest * by_theta.change,
         turning: steep.length().recip(),
     }
 }
 
 /// A bound of the distance of normals on a patch, and one of s. The same ranges as for `sizes`.
 pub fn normals_apart(ranges: [[Range; 3]; 3], heights: [f64; 2]) -> (f64, f64) {
-    let Sizes { x, turning, .. } = sizes(ranges, heights);
-    let near = turning * x.change * ROUNDING;
+    let Sizes {
+        x, across, turning, ..
+    } = sizes(ranges, heights);
+    // ‖Dφ(X) v‖ = s² √(‖v‖² + (X × v)²), which is at most s ‖v‖. Where surfaces are steep, v is nearly
+    // along X, and the first is far less.
+    let along = turning * turning * DVec2::new(x.change, across).length();
+    let near = along.min(turning * x.change) * ROUNDING;
     let bound = near.min(rough_bound(ranges[0], ranges[1], heights));
     (bound, turning)
 }
 
 /// How far normals are apart: how far those of two values of X are, and how far all others are from
 /// these.
-pub fn rough_bound(one: [Range; 3], other: [Range; 3], heights: [f64; 2]) -> f64 {
+fn rough_bound(one: [Range; 3], other: [Range; 3], heights: [f64; 2]) -> f64 {
     let mut spread = 0.0;
     let [n, m] = [(one, heights[0]), (other, heights[1])].map(|(ranges, height)| {
         let [f, fu, ft] = ranges;
@@ -101,6 +110,7 @@ pub fn bends(of: Distance, ranges: &[Ranges; 3], heights: [f64; 2]) -> [f64; 3] 
         ft,
         x,
         turning,
+        ..
     } = sizes(ranges.map(|r| [r[0][0], r[1][0], r[0][1]]), heights);
     let [first, second, difference] = ranges;
     let size = |a: usize, b: usize| Size {

@@ -29,6 +29,8 @@ pub struct Cell {
     pub half: DVec2,
     /// Bounds of the second derivatives uu, uθ, θθ of δ on the cell or on one that it is part of.
     pub bends: [f64; 3],
+    /// Second derivatives bound δ no better than the ranges of the first ones.
+    pub is_rough: bool,
     /// How often its patch was halved.
     pub depth: u32,
     /// How far the value and the derivatives of δ by u and θ at a point may be from the exact ones.

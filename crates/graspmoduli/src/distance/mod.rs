@@ -10,7 +10,7 @@
 
 use crate::error::Error;
 use crate::surface::Surface;
-use bounds::{FURTHEST, bends, rough_bound};
+use bounds::{bends, normals_apart};
 use cell::{Cell, Distance, Noise};
 use glam::{DVec2, DVec3};
 use net::ranges_on;
@@ -18,6 +18,7 @@ use pair::{Pair, Patch};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 mod bounds;
 mod cell;
@@ -26,7 +27,10 @@ mod pair;
 mod size;
 
 /// Cells looked at before the search ends with the bound that it has.
-const MOST_CELLS: usize = 1 << 20;
+const MOST_CELLS: usize = 1 << 18;
+
+/// Cells between two calls of the progress function.
+const CELLS_BETWEEN: usize = 1 << 12;
 
 /// Bounds of second derivatives are computed anew on cells halved up to three times, and then at
 /// every fourth halving up to this one, beyond which derivatives of nets are mostly rounding. In
@@ -76,10 +80,14 @@ impl Best {
 }
 
 /// d(S, S') to a relative error of `tolerance`, or to rounding where that is more.
+///
+/// `progress` is called every few milliseconds; what it answers may end the search with
+/// [`Error::Interrupted`].
 pub fn surface_distance(
     first: &Surface,
     second: &Surface,
     tolerance: f64,
+    mut progress: impl FnMut() -> ControlFlow<()>,
 ) -> Result<SurfaceDistance, Error> {
     if tolerance.is_nan() || tolerance <= 0.0 {
         return Err(Error::Tolerance(tolerance));
@@ -123,7 +131,10 @@ pub fn surface_distance(
         };
         for mut cell in parts.into_iter().flatten() {
             examined += 1;
-            match examine(&pair, &mut cell, &mut best) {
+            if examined % CELLS_BETWEEN == 0 && progress().is_break() {
+                return Err(Error::Interrupted);
+            }
+            match examine(&pair, &mut cell, &mut best, bound) {
                 Outcome::Bounded {
                     bound,
                     noise,
@@ -196,24 +207,25 @@ enum Outcome {
     LargestElsewhere,
 }
 
-/// Bounds a cell after trying its centre and the corner that promises most.
+/// Bounds a cell after trying its centre and the corner that promises most. `known` is a bound for a
+/// larger one.
 ///
 /// Where ‖δ‖ is shown to grow all over the cell in one direction, it is largest on the edge: if
 /// that is an end of the surfaces, only the edge is left, else the largest is beyond it.
-fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best) -> Outcome {
-    let mut rough = f64::INFINITY;
-    if cell.of == Distance::Normals {
-        rough = FURTHEST;
-    }
-    if cell.depth <= DEEPEST && (cell.depth < 4 || cell.depth.is_multiple_of(4)) {
+fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best, known: f64) -> Outcome {
+    let mut rough = known;
+    let regular = cell.depth < 4 || cell.depth.is_multiple_of(4);
+    if cell.of == Distance::Normals && cell.is_rough && cell.depth <= 2 * DEEPEST
+        || regular && cell.depth <= DEEPEST
+    {
         let mut ranges =
             std::array::from_fn(|k| ranges_on(&cell.nets[k], cell.span, cell.net_errors[k]));
         for (ranges, lowest) in ranges.iter_mut().zip(cell.lowest) {
             ranges[0][0].low = ranges[0][0].low.max(lowest);
         }
         if cell.of == Distance::Normals {
-            let [one, other, _] = ranges.map(|r| [r[0][0], r[1][0], r[0][1]]);
-            rough = rough_bound(one, other, pair.heights) + cell.noise.value;
+            let low = ranges.map(|r| [r[0][0], r[1][0], r[0][1]]);
+            rough = rough.min(normals_apart(low, pair.heights).0 + cell.noise.value);
             if rough < best.value {
                 return Outcome::Below(rough);
             }
@@ -241,8 +253,10 @@ fn examine(pair: &Pair, cell: &mut Cell, best: &mut Best) -> Outcome {
         best.improve(pair.difference(cell.of, corner)[0].length(), corner);
     }
     let rounding = longest * 1e-15 + model.noise.value + model.noise.slope.dot(model.half);
+    let close = longest + model.bend() + rounding;
+    cell.is_rough = rough < close;
     Outcome::Bounded {
-        bound: (longest + model.bend() + rounding).min(rough),
+        bound: close.min(rough),
         noise: model.noise.value,
         along_u: model.is_better_halved_along_u(),
     }
@@ -356,11 +370,15 @@ mod tests {
         Surface::new(-height, height, columns, coefficients).unwrap()
     }
 
+    fn between(first: &Surface, second: &Surface) -> SurfaceDistance {
+        surface_distance(first, second, 1e-6, || ControlFlow::Continue(())).unwrap()
+    }
+
     #[test]
     fn no_point_of_a_fine_grid_is_further_apart_and_some_is_as_far() {
         for seed in 1..12 {
             let (first, second) = (surface(0.6, seed, 7, 8), surface(0.7, seed + 50, 5, 4));
-            let found = surface_distance(&first, &second, 1e-6).unwrap();
+            let found = between(&first, &second);
             assert!(found.error <= 1e-6 * found.value);
             let apart = |u: f64, theta: f64| {
                 let (p, q) = (first.contact(u, theta), second.contact(u, theta));
@@ -388,10 +406,10 @@ mod tests {
                 .map(|(k, c)| c + size * crate::math::sin(k as f64))
                 .collect();
             let second = Surface::new(-0.6, 0.6, 8, moved).unwrap();
-            let found = surface_distance(&first, &second, 1e-6).unwrap();
+            let found = between(&first, &second);
             assert!(found.value > 0.1 * size && found.value < 100.0 * size);
             assert!(found.error <= 1e-6 * found.value);
         }
-        assert_eq!(surface_distance(&first, &first, 1e-6).unwrap().value, 0.0);
+        assert_eq!(between(&first, &first).value, 0.0);
     }
 }

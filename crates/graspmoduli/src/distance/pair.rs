@@ -146,6 +146,7 @@ impl Pair {
             center: DVec2::new((2 * i + 1) as f64, (2 * j + 1) as f64) * span,
             half: DVec2::new(span.x, if self.round { 0.0 } else { span.y }),
             bends: [f64::INFINITY; 3],
+            is_rough: true,
             depth: 0,
             noise,
         }
