@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 #: How far the length of a unit normal may be from 1; it is normalised to rounding.
 UNIT_TOLERANCE = 1e-4
 #: More edges of a friction cone than this are refused: a circle to 1e-9.
-MOST_EDGES = 2**16
+MOST_EDGES = 2**12
 #: Larger friction coefficients are refused: the kernels would lose them to rounding.
 MOST_FRICTION = 1e6
 

@@ -86,7 +86,7 @@ def quality(
         (m,), or one per contact of every grasp (..., m). Without friction fewer than seven hard
         contacts, and fewer than four soft ones, have quality 0.
     edges
-        Number l of edges of the friction cones, from 3 to 65,536; 8 if not given.
+        Number l of edges of the friction cones, from 3 to 4,096; 8 if not given.
     torsion
         Torsional friction coefficient γ ≥ 0 of soft fingers, a length; 0, hard fingers, if not
         given. With normal force 1 a finger also applies a torque about its normal of up to γ.

@@ -237,7 +237,8 @@ class WrenchSpace:
         """Weights of the wrenches, or a twist that proves that there are none; both with torques
         over the longest lever arm."""
         scaled = self.wrenches / self._reach
-        axes, extents, _ = np.linalg.svd(scaled.T)
+        # Few wrenches do not have all directions; of many the other factor would be huge.
+        axes, extents, _ = np.linalg.svd(scaled.T, full_matrices=len(scaled) < 6)
         rank = int((extents > self._flat * extents[0]).sum())
         across = axes[:, rank:]
         beyond = across @ (across.T @ target)

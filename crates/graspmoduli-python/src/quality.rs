@@ -131,7 +131,7 @@ pub fn quality_of_one(
         let (friction, edges) = (plain(friction, 1.0)?, whole(edges, 8)?);
         let torsion = plain(torsion, 0.0)? / scale;
         let each = norm.cast::<PyString>().ok()?.to_str().ok()? != "sum";
-        let fine = (3..=1 << 16).contains(&edges)
+        let fine = (3..=1 << 12).contains(&edges)
             && (0.0..=1e6).contains(&friction)
             && torsion >= 0.0
             && is_usable(torsion)
