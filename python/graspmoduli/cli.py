@@ -47,14 +47,14 @@ PICTURES = (".png", ".svg", ".pdf", ".jpg", ".jpeg", ".webp")
 
 def main() -> None:
     """Entry point: errors are one line on standard error; wrong input exits with 2."""
-    _signals.heed()
-    for stream in (sys.stdout, sys.stderr):
-        # What the output's encoding lacks is written as an escape.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-    # Pictures are drawn without a window, whatever the environment asks of matplotlib.
-    os.environ["MPLBACKEND"] = "agg"
     try:
+        _signals.heed()
+        for stream in (sys.stdout, sys.stderr):
+            # What the output's encoding lacks is written as an escape.
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+        # Pictures are drawn without a window, whatever the environment asks of matplotlib.
+        os.environ["MPLBACKEND"] = "agg"
         code = _run(sys.argv[1:])
     except (KeyboardInterrupt, EOFError):
         code = _signals.code(signal.SIGINT)
