@@ -213,6 +213,16 @@ class TestSeveralObjects:
         assert read(can(200)).size > 2.0
 
 
+@pytest.mark.parametrize("name", FILES)
+def test_a_name_need_not_be_utf_8(tmp_path, name):
+    path = tmp_path / f"\udcff\udcfe.{name.split()[-1]}"
+    try:
+        path.write_bytes(FILES[name])
+    except (OSError, UnicodeError):
+        pytest.skip("a file system of UTF-8 names")
+    assert read(path).size == pytest.approx(3.4, rel=1e-2)
+
+
 def test_a_name_that_cannot_be_is_one_sentence():
     for name in ("x" * 300 + ".ply", "a\0b.ply", "y" * 300 + "/z.ply"):
         with pytest.raises(gm.GraspModuliError, match="object must be a file that exists"):

@@ -124,7 +124,11 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     # What it cannot make sense of it would tell with a traceback.
     log.setLevel(logging.CRITICAL)
     try:
-        scene = trimesh.load_scene(path, process=False)
+        # It names parts after the file, and wants UTF-8 of that.
+        resolver = trimesh.resolvers.FilePathResolver(str(path))
+        resolver.file_name = "object"
+        with path.open("rb") as file:
+            scene = trimesh.load_scene(file, path.suffix[1:].lower(), resolver, process=False)
     finally:
         log.setLevel(level)
     meshes: list[Any] = []
