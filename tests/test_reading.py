@@ -1,5 +1,6 @@
 """Readers: every format, what is missing in it, and what is broken."""
 
+import contextlib
 import warnings
 from typing import Any
 
@@ -138,6 +139,25 @@ def test_missing_pixels_are_left_out_and_counted(tmp_path):
 def can(n=4000, seed=0):
     t, h = np.random.default_rng(seed).random((2, n))
     return np.stack([np.cos(7 * t), np.sin(7 * t), 2 * h], axis=1)
+
+
+def test_warnings_are_for_who_calls_fit():
+    few = can()
+    few[:3] = np.nan
+    handle = 0.3 * can(150) + np.array([8, 0, 0])
+    two = np.vstack([can(), can() + np.array([2.2, 0, 0])])
+    for points, words in (
+        (few, "3 of 4,000 points are NaN"),
+        (np.vstack([can(), handle]), "lies apart"),
+        (two, "in 2 parts"),
+    ):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            # Two beside each other are no surface: the warning comes first.
+            with contextlib.suppress(gm.GraspModuliError):
+                gm.fit(points)
+        found = [w for w in caught if words in str(w.message)]
+        assert [w.filename for w in found] == [__file__]
 
 
 @pytest.mark.parametrize("scale", [1e-44, 1e-12, 1e12, 1e44])

@@ -36,6 +36,8 @@ MOST_AREA = 8.0
 THICK_PLANE, THICK_LINE = 0.65, 0.35
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
+#: The level of who calls what is public and calls :func:`read`, from where warnings are given.
+TO_CALLER = 5
 #: Points of a cloud that are used; more add nothing but time.
 MOST_POINTS = 30_000
 
@@ -252,7 +254,7 @@ def _without_missing(array: Floats) -> Floats:
     if missing.any():
         warnings.warn(
             f"{missing.sum():,} of {len(array):,} points are NaN, missing pixels, and left out",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
     return np.ascontiguousarray(array[~missing])
 
@@ -409,13 +411,13 @@ def _check_single(thing: Object) -> None:
         warnings.warn(
             f"the object's points are in {parts} parts with a narrow space between them; "
             "they are taken for one object",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
     noise = 1.0 - float(apart[0])
     if noise > MUCH_NOISE:
         warnings.warn(
             f"{noise:.1%} of the object lies apart from the rest and is taken for noise",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
 
 
