@@ -233,6 +233,23 @@ class TestSeveralObjects:
         assert read(can(200)).size > 2.0
 
 
+@pytest.mark.parametrize("corner", ["{}", "{}/1", "{}//1", "{}/10/20"])
+def test_faces_of_obj_files_count_from_1(tmp_path, corner):
+    mesh = trimesh.creation.icosphere(2)
+    vertices = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    for first in (1, 0):
+        faces = [
+            "f " + " ".join(corner.format(i + first) for i in face) for face in mesh.faces.tolist()
+        ]
+        row = 163 + min(i for i, face in enumerate(mesh.faces) if 0 in face)
+        path = write(tmp_path, "obj", "\n".join(vertices + faces).encode())
+        if first == 1:
+            assert read(path).size == pytest.approx(2.0, rel=1e-2)
+        else:
+            with pytest.raises(gm.GraspModuliError, match=f"from 1.*vertex 0 in row {row}$"):
+                read(path)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_name_need_not_be_utf_8(tmp_path, name):
     path = tmp_path / f"\udcff\udcfe.{name.split()[-1]}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,8 @@ MOST_AREA = 8.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
 #: if they are 20 times longer than wide, a line.
 THICK_PLANE, THICK_LINE = 0.65, 0.35
+#: A face of an OBJ file with a vertex 0: the first number of a corner such as 3/1/2.
+VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:[^\r\n]*[ \t])?[+-]?0+(?![^/\s])", re.MULTILINE)
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
 #: The level of who calls what is public and calls :func:`read`, from where warnings are given.
@@ -179,7 +182,10 @@ def _promised_vertices(path: Path) -> int | None:
 
 
 def _check_text(path: Path) -> None:
-    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks, or fewer rows than announced."""
+    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks or fewer rows than announced.
+
+    And OBJ faces that count vertices from 0.
+    """
     kind = path.suffix.lower()
     if kind not in (".off", ".obj", ".stl"):
         return
@@ -191,6 +197,12 @@ def _check_text(path: Path) -> None:
     name = kind[1:].upper()
     if b"\0" in text:
         raise GraspModuliError(f"object must be a whole {name} file, got {path} with zeroed bytes")
+    if kind == ".obj" and (found := VERTEX_0.search(text)):
+        row = text[: found.start()].count(b"\n") + 1
+        raise GraspModuliError(
+            f"object must have faces that count vertices from 1, as OBJ files do, got {path} with "
+            f"vertex 0 in row {row}"
+        )
     if kind == ".stl" and b"endsolid" not in text:
         raise GraspModuliError(f"object must be a whole STL file, got {path} without its end")
     if kind == ".stl" and text.count(b"vertex ") != 3 * text.count(b"endfacet"):
