@@ -141,6 +141,14 @@ def test_wrong_input_gives_one_line_and_exit_code_2(
     assert sorted(p.name for p in bad_files.iterdir()) == before
 
 
+@pytest.mark.parametrize("name", ["a\nb.ply", "a\rb\n\n.docx", "\n"])
+def test_a_name_of_several_lines_gives_one(tmp_path, capsys, name):
+    (tmp_path / "there\n.docx").write_text("hello")
+    for path in (tmp_path / name, tmp_path / "there\n.docx"):
+        assert cli._run(["grasp", str(path)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
 #: What people and programs write where a number is wanted.
 VALUES = st.one_of(
     st.integers().map(str),

@@ -101,7 +101,8 @@ class _Console(Console):
 
 
 def _fail(message: str) -> int:
-    _signals.say(message)
+    # A file's name may hold ends of lines.
+    _signals.say(" ".join(message.splitlines()))
     return 2
 
 
