@@ -392,7 +392,7 @@ def _report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> di
 
 
 def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
-    axis = ", ".join(f"{x:+.2f}" for x in fit.pose[:3, 2])
+    axis = ", ".join(f"{_rounded(x, 2):+.2f}" for x in fit.pose[:3, 2])
     lines = [
         f"{path}: size {fit.residual.size:.4g}, axis ({axis})",
         f"fit: rms {fit.residual.relative_rms:.2%} and max {fit.residual.relative_max:.2%} of the "
@@ -431,7 +431,10 @@ def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     for rank, grasp in enumerate(grasps, 1):
-        points = [", ".join(f"{x:.{digits}f}" for x in point) for point in grasp.contacts]
+        points = [
+            ", ".join(f"{_rounded(x, digits):.{digits}f}" for x in point)
+            for point in grasp.contacts
+        ]
         head = [str(rank), f"{grasp.quality:.4f}"]
         if stacked:
             for finger, point in enumerate(points, 1):
@@ -439,6 +442,11 @@ def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
         else:
             table.add_row(*head, *points)
     return table
+
+
+def _rounded(x: float, digits: int) -> float:
+    """Without a zero that is negative."""
+    return round(float(x), digits) + 0.0
 
 
 def _width(table: Table) -> int:
