@@ -1,5 +1,6 @@
 """The command line as users meet it."""
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -139,6 +140,28 @@ def test_wrong_input_gives_one_line_and_exit_code_2(
     assert len(output.err.strip().splitlines()) == 1, output.err
     assert output.out == ""
     assert sorted(p.name for p in bad_files.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["a\nb.ply", "a\rb\n\n.docx", "\n"])
+def test_a_name_of_several_lines_gives_one(tmp_path, capsys, name):
+    (tmp_path / "there\n.docx").write_text("hello")
+    for path in (tmp_path / name, tmp_path / "there\n.docx"):
+        assert cli._run(["grasp", str(path)]) == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_no_zero_is_negative(capsys):
+    t, h = np.random.default_rng(0).random((2, 900))
+    fit = gm.fit(np.stack([np.cos(7 * t), np.sin(7 * t), 2 * h], axis=1))
+    grasp = fit.synthesize(top=1)[0]
+    tiny = dataclasses.replace(grasp, contacts=np.full((3, 3), -1e-9))
+    pose = fit.pose.copy()
+    pose[:3, 2] = [-1e-9, -1e-9, -1.0]
+    cli._print("can.npy", dataclasses.replace(fit, pose=pose), [tiny], 8)
+    output = capsys.readouterr().out
+    assert "axis (+0.00, +0.00, -1.00)" in output
+    assert output.count("  0.000, 0.000, 0.000") == 3
+    assert "-0.0" not in output
 
 
 #: What people and programs write where a number is wanted.

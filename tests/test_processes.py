@@ -223,6 +223,10 @@ def ended(process, number, within=10.0):
     return errors, time.monotonic() - begin
 
 
+#: The command as it is installed.
+SCRIPT = [str(Path(sys.executable).with_name("graspmoduli"))]
+
+
 @pytest.mark.parametrize(
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
@@ -243,6 +247,24 @@ class TestSignals:
         assert errors == f"graspmoduli: {word}\n"
         assert seconds < 5.0
         assert {p.name for p in tmp_path.iterdir()} <= {"pieces.sqlite", "pieces.sqlite-journal"}
+
+    @pytest.mark.parametrize(
+        ("command", "imported"),
+        [(SCRIPT, "numpy"), (SCRIPT, "typer"), (COMMAND, "typer")],
+        ids=["script numpy", "script typer", "module typer"],
+    )
+    def test_a_start_ends_in_one_line(self, tmp_path, number, code, word, command, imported):
+        # An import that takes long.
+        (tmp_path / f"{imported}.py").write_text(
+            "import time\nprint('begun', flush=True)\ntime.sleep(60)\n"
+        )
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        process = self.start(*command, "--version", env=environment)
+        assert process.stdout
+        assert process.stdout.readline() == "begun\n"
+        errors, seconds = ended(process, number)
+        assert (process.returncode, errors) == (code, f"graspmoduli: {word}\n")
+        assert seconds < 5.0
 
     @pytest.mark.parametrize("work", ["kernel", "writing"])
     def test_work_that_hears_no_signal_ends_too(self, tmp_path, number, code, word, work):

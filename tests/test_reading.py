@@ -1,5 +1,6 @@
 """Readers: every format, what is missing in it, and what is broken."""
 
+import contextlib
 import warnings
 from typing import Any
 
@@ -140,6 +141,25 @@ def can(n=4000, seed=0):
     return np.stack([np.cos(7 * t), np.sin(7 * t), 2 * h], axis=1)
 
 
+def test_warnings_are_for_who_calls_fit():
+    few = can()
+    few[:3] = np.nan
+    handle = 0.3 * can(150) + np.array([8, 0, 0])
+    two = np.vstack([can(), can() + np.array([2.2, 0, 0])])
+    for points, words in (
+        (few, "3 of 4,000 points are NaN"),
+        (np.vstack([can(), handle]), "lies apart"),
+        (two, "in 2 parts"),
+    ):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            # Two beside each other are no surface: the warning comes first.
+            with contextlib.suppress(gm.GraspModuliError):
+                gm.fit(points)
+        found = [w for w in caught if words in str(w.message)]
+        assert [w.filename for w in found] == [__file__]
+
+
 @pytest.mark.parametrize("scale", [1e-44, 1e-12, 1e12, 1e44])
 def test_any_unit_gives_the_same_grasps(scale):
     mesh = trimesh.creation.cylinder(1.0, 2.5)
@@ -211,6 +231,33 @@ class TestSeveralObjects:
 
     def test_few_points_are_not_taken_for_parts(self):
         assert read(can(200)).size > 2.0
+
+
+@pytest.mark.parametrize("corner", ["{}", "{}/1", "{}//1", "{}/10/20"])
+def test_faces_of_obj_files_count_from_1(tmp_path, corner):
+    mesh = trimesh.creation.icosphere(2)
+    vertices = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    for first in (1, 0):
+        faces = [
+            "f " + " ".join(corner.format(i + first) for i in face) for face in mesh.faces.tolist()
+        ]
+        row = 163 + min(i for i, face in enumerate(mesh.faces) if 0 in face)
+        path = write(tmp_path, "obj", "\n".join(vertices + faces).encode())
+        if first == 1:
+            assert read(path).size == pytest.approx(2.0, rel=1e-2)
+        else:
+            with pytest.raises(gm.GraspModuliError, match=f"from 1.*vertex 0 in row {row}$"):
+                read(path)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_name_need_not_be_utf_8(tmp_path, name):
+    path = tmp_path / f"\udcff\udcfe.{name.split()[-1]}"
+    try:
+        path.write_bytes(FILES[name])
+    except (OSError, UnicodeError):
+        pytest.skip("a file system of UTF-8 names")
+    assert read(path).size == pytest.approx(3.4, rel=1e-2)
 
 
 def test_a_name_that_cannot_be_is_one_sentence():

@@ -1,5 +1,5 @@
 """``python -m graspmoduli``."""
 
-from .cli import main
+from _graspmoduli_command import main
 
 main()

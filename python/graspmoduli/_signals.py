@@ -10,12 +10,12 @@ import sys
 import threading
 from types import FrameType
 
+from _graspmoduli_command import WORDS
+
 from ._files import discard_unfinished
 
 #: A command that has not ended by itself after this many seconds is ended.
 GRACE = 1.0
-#: What a signal means, in a word.
-WORDS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 
 _told = threading.Event()
 
@@ -34,11 +34,11 @@ def heed() -> None:
     Python's own handlers wait until the main thread is back from compiled code. A byte in a socket
     is there at once, and a thread waits for it.
     """
-    for name in ("SIGTERM", "SIGHUP"):
+    for name in WORDS:
         number = getattr(signal, name, None)
         # What is ignored stays so: nohup.
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, _raise)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if name == "SIGINT" else _raise)
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
@@ -67,7 +67,7 @@ def _raise(number: int, _frame: FrameType | None) -> None:
 def _watch(reader: socket.socket, _writer: socket.socket) -> None:
     while True:
         number = reader.recv(1)[0]
-        if number in (signal.SIGINT, *(getattr(signal, n, 0) for n in ("SIGTERM", "SIGHUP"))):
+        if number in [getattr(signal, name, 0) for name in WORDS]:
             # The main thread may see to it in good order.
             threading.Event().wait(GRACE)
             discard_unfinished()

@@ -47,14 +47,14 @@ PICTURES = (".png", ".svg", ".pdf", ".jpg", ".jpeg", ".webp")
 
 def main() -> None:
     """Entry point: errors are one line on standard error; wrong input exits with 2."""
-    _signals.heed()
-    for stream in (sys.stdout, sys.stderr):
-        # What the output's encoding lacks is written as an escape.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-    # Pictures are drawn without a window, whatever the environment asks of matplotlib.
-    os.environ["MPLBACKEND"] = "agg"
     try:
+        _signals.heed()
+        for stream in (sys.stdout, sys.stderr):
+            # What the output's encoding lacks is written as an escape.
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+        # Pictures are drawn without a window, whatever the environment asks of matplotlib.
+        os.environ["MPLBACKEND"] = "agg"
         code = _run(sys.argv[1:])
     except (KeyboardInterrupt, EOFError):
         code = _signals.code(signal.SIGINT)
@@ -101,7 +101,8 @@ class _Console(Console):
 
 
 def _fail(message: str) -> int:
-    _signals.say(message)
+    # A file's name may hold ends of lines.
+    _signals.say(" ".join(message.splitlines()))
     return 2
 
 
@@ -391,7 +392,7 @@ def _report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> di
 
 
 def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
-    axis = ", ".join(f"{x:+.2f}" for x in fit.pose[:3, 2])
+    axis = ", ".join(f"{_rounded(x, 2):+.2f}" for x in fit.pose[:3, 2])
     lines = [
         f"{path}: size {fit.residual.size:.4g}, axis ({axis})",
         f"fit: rms {fit.residual.relative_rms:.2%} and max {fit.residual.relative_max:.2%} of the "
@@ -430,7 +431,10 @@ def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     for rank, grasp in enumerate(grasps, 1):
-        points = [", ".join(f"{x:.{digits}f}" for x in point) for point in grasp.contacts]
+        points = [
+            ", ".join(f"{_rounded(x, digits):.{digits}f}" for x in point)
+            for point in grasp.contacts
+        ]
         head = [str(rank), f"{grasp.quality:.4f}"]
         if stacked:
             for finger, point in enumerate(points, 1):
@@ -438,6 +442,11 @@ def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
         else:
             table.add_row(*head, *points)
     return table
+
+
+def _rounded(x: float, digits: int) -> float:
+    """Without a zero that is negative."""
+    return round(float(x), digits) + 0.0
 
 
 def _width(table: Table) -> int:

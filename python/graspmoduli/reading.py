@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,8 +35,12 @@ MOST_AREA = 8.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
 #: if they are 20 times longer than wide, a line.
 THICK_PLANE, THICK_LINE = 0.65, 0.35
+#: A face of an OBJ file with a vertex 0: the first number of a corner such as 3/1/2.
+VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:[^\r\n]*[ \t])?[+-]?0+(?![^/\s])", re.MULTILINE)
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
+#: The level of who calls what is public and calls :func:`read`, from where warnings are given.
+TO_CALLER = 5
 #: Points of a cloud that are used; more add nothing but time.
 MOST_POINTS = 30_000
 
@@ -124,7 +129,11 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     # What it cannot make sense of it would tell with a traceback.
     log.setLevel(logging.CRITICAL)
     try:
-        scene = trimesh.load_scene(path, process=False)
+        # It names parts after the file, and wants UTF-8 of that.
+        resolver = trimesh.resolvers.FilePathResolver(str(path))
+        resolver.file_name = "object"
+        with path.open("rb") as file:
+            scene = trimesh.load_scene(file, path.suffix[1:].lower(), resolver, process=False)
     finally:
         log.setLevel(level)
     meshes: list[Any] = []
@@ -173,7 +182,10 @@ def _promised_vertices(path: Path) -> int | None:
 
 
 def _check_text(path: Path) -> None:
-    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks, or fewer rows than announced."""
+    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks or fewer rows than announced.
+
+    And OBJ faces that count vertices from 0.
+    """
     kind = path.suffix.lower()
     if kind not in (".off", ".obj", ".stl"):
         return
@@ -185,6 +197,12 @@ def _check_text(path: Path) -> None:
     name = kind[1:].upper()
     if b"\0" in text:
         raise GraspModuliError(f"object must be a whole {name} file, got {path} with zeroed bytes")
+    if kind == ".obj" and (found := VERTEX_0.search(text)):
+        row = text[: found.start()].count(b"\n") + 1
+        raise GraspModuliError(
+            f"object must have faces that count vertices from 1, as OBJ files do, got {path} with "
+            f"vertex 0 in row {row}"
+        )
     if kind == ".stl" and b"endsolid" not in text:
         raise GraspModuliError(f"object must be a whole STL file, got {path} without its end")
     if kind == ".stl" and text.count(b"vertex ") != 3 * text.count(b"endfacet"):
@@ -248,7 +266,7 @@ def _without_missing(array: Floats) -> Floats:
     if missing.any():
         warnings.warn(
             f"{missing.sum():,} of {len(array):,} points are NaN, missing pixels, and left out",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
     return np.ascontiguousarray(array[~missing])
 
@@ -405,13 +423,13 @@ def _check_single(thing: Object) -> None:
         warnings.warn(
             f"the object's points are in {parts} parts with a narrow space between them; "
             "they are taken for one object",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
     noise = 1.0 - float(apart[0])
     if noise > MUCH_NOISE:
         warnings.warn(
             f"{noise:.1%} of the object lies apart from the rest and is taken for noise",
-            stacklevel=4,
+            stacklevel=TO_CALLER,
         )
 
 
