@@ -31,7 +31,7 @@ MUCH_NOISE = 0.01
 #: Extents between which products of several lengths neither overflow nor vanish.
 LEAST_EXTENT, GREATEST_EXTENT = 1e-45, 1e45
 #: A mesh whose area is more times that of the box around it is no surface but a heap of triangles.
-MOST_AREA = 8.0
+MOST_AREA = 4.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
 #: if they are 20 times longer than wide, a line.
 THICK_PLANE, THICK_LINE = 0.65, 0.35
