@@ -120,6 +120,7 @@ def _from_file(path: Path) -> tuple[Any, Any]:
 
 def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     import trimesh
+    from trimesh.resolvers import FilePathResolver
 
     promised = _promised_vertices(path)
     _check_text(path)
@@ -130,7 +131,7 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     log.setLevel(logging.CRITICAL)
     try:
         # It names parts after the file, and wants UTF-8 of that.
-        resolver = trimesh.resolvers.FilePathResolver(str(path))
+        resolver = FilePathResolver(str(path))
         resolver.file_name = "object"
         with path.open("rb") as file:
             scene = trimesh.load_scene(file, path.suffix[1:].lower(), resolver, process=False)
