@@ -203,6 +203,21 @@ def test_a_heap_of_triangles_is_refused(count):
         read((corners, np.arange(3 * count).reshape(-1, 3)))
 
 
+def test_a_heap_of_few_triangles_is_refused():
+    # What would take many seconds, with about 6 times the area of the box.
+    rng = np.random.default_rng(0)
+    with pytest.raises(gm.GraspModuliError, match="object must be a surface, got 900 triangles"):
+        read((rng.normal(size=(900, 3)), rng.integers(0, 900, (900, 3))))
+
+
+@pytest.mark.parametrize("shells", [1, 3])
+def test_walls_within_walls_are_no_heap(shells):
+    # Each has the area of the box around it.
+    box = trimesh.creation.box()
+    boxes = [box.copy().apply_scale(1.0 - 0.01 * shell) for shell in range(shells)]
+    assert read(trimesh.util.concatenate(boxes)).size > 1.0
+
+
 @pytest.mark.parametrize("noise", [1e-4, 0.003, 0.01])
 @pytest.mark.parametrize("flat", [(1, 0, 0), (1, 1, 0)])
 def test_a_line_or_a_plane_with_noise_is_refused(noise, flat):

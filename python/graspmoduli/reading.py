@@ -31,7 +31,7 @@ MUCH_NOISE = 0.01
 #: Extents between which products of several lengths neither overflow nor vanish.
 LEAST_EXTENT, GREATEST_EXTENT = 1e-45, 1e45
 #: A mesh whose area is more times that of the box around it is no surface but a heap of triangles.
-MOST_AREA = 8.0
+MOST_AREA = 4.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
 #: if they are 20 times longer than wide, a line.
 THICK_PLANE, THICK_LINE = 0.65, 0.35
@@ -120,6 +120,7 @@ def _from_file(path: Path) -> tuple[Any, Any]:
 
 def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     import trimesh
+    from trimesh.resolvers import FilePathResolver
 
     promised = _promised_vertices(path)
     _check_text(path)
@@ -130,7 +131,7 @@ def _from_mesh_file(path: Path) -> tuple[Any, Any]:
     log.setLevel(logging.CRITICAL)
     try:
         # It names parts after the file, and wants UTF-8 of that.
-        resolver = trimesh.resolvers.FilePathResolver(str(path))
+        resolver = FilePathResolver(str(path))
         resolver.file_name = "object"
         with path.open("rb") as file:
             scene = trimesh.load_scene(file, path.suffix[1:].lower(), resolver, process=False)
