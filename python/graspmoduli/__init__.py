@@ -12,7 +12,7 @@ the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:
                        :func:`sample_combinations`, :func:`closest_combination`
 random configurations  :func:`sample_configurations`, :func:`sample_nearby`
 guarantees             :func:`certified_radius`, :func:`certify_transfer`,
-                       :func:`transfer_bound`
+                       :func:`transfer_bound`, :func:`epsilon`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`
@@ -32,6 +32,8 @@ from ._extras import MissingExtraError as MissingExtraError
 from .configurations import Configurations as Configurations
 from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
+from .epsilon import Epsilon as Epsilon
+from .epsilon import epsilon as epsilon
 from .fitting import Fit as Fit
 from .fitting import ObjectGrasp as ObjectGrasp
 from .fitting import Residual as Residual
