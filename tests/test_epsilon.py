@@ -4,12 +4,14 @@
 # pyright: reportArgumentType=false
 
 import importlib
+import json
 from typing import Any
 
 import numpy as np
 import pytest
 
 import graspmoduli as gm
+from conftest import ROOT
 from graspmoduli.experiments.worst import proven_radius
 
 # The package's name of the module is that of the function.
@@ -124,3 +126,30 @@ def test_wrong_input_is_said_so():
     ):
         with pytest.raises(gm.GraspModuliError, match=sentence):
             call()
+
+
+def test_the_table_of_the_page_is_that_of_its_pairs_and_they_are_proofs():
+    page = (ROOT / "docs/epsilon.md").read_text()
+    rows = json.loads((ROOT / "docs/epsilon.json").read_text())
+    assert len(rows) >= 5
+    for row in rows:
+        low, high, r, friction, edges = row["setting"]
+        good, lost = (gm.PlacedGrasp(**g) for g in row["pair"])
+        assert gm.placed_distance(good, lost) == pytest.approx(row["upper"], rel=1e-12)
+        assert module.proven(module.Setting(*row["setting"])) == row["lower"]
+        for points in (good.contacts, good.center_of_mass):
+            assert np.linalg.norm(points, axis=-1).max() <= r * (1 + 1e-12)
+        if edges is None:
+            sixteen = gm.quality(good, friction=friction, edges=16)
+            assert max(sixteen, gm.circular_quality(good, friction=friction).lower) >= high
+            assert gm.circular_quality(lost, friction=friction).upper <= low
+            factor = row["upper"] / row["lower"]
+            assert factor < (2.4 if low > 0.0 else 2.1 if r > 1.0 else 2.0)
+        else:
+            assert gm.quality(good, friction=friction, edges=edges) >= high
+            assert gm.quality(lost, friction=friction, edges=edges) <= low
+        line = (
+            f"| {low:g} | {high:g} | {r:g} | {friction:g} | {edges or 'round'} "
+            f"| {row['lower']:.4f} | {row['upper']:.4f} |"
+        )
+        assert line in page
