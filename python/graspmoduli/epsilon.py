@@ -98,11 +98,13 @@ def epsilon(
     low, high = coefficient("delta_minus", delta_minus), number("delta_plus", delta_plus)
     if not high > low:
         raise GraspModuliError(f"delta_plus must be greater than delta_minus, got {high} and {low}")
+    if high > 1e60:
+        raise GraspModuliError(f"delta_plus must be at most 1e60, got {high}")
     radius = number("r", r, positive=True)
     m = count("contacts", contacts, 3, 1000)
     mu, l = cone(friction, INSCRIBED if edges is None else edges)
     setting = Setting(low, high, radius, mu, None if edges is None else l)
-    pair = _search(setting, count("seed", seed, 0, 2**64 - 1), count("rounds", rounds, 1))
+    pair = _search(setting, count("seed", seed, 0, 2**64 - 1), count("rounds", rounds, 1, 100_000))
     lower = proven(setting)
     if pair is None:
         return Epsilon(lower, np.inf, None)
