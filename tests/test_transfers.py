@@ -1,5 +1,7 @@
 """Quality along curves, and grasps carried between real objects."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import trimesh
@@ -280,3 +282,26 @@ class TestChainsAndCurves:
         np.testing.assert_allclose(own.quality, pieces[0].quality, atol=1e-8)
         with pytest.raises(gm.GraspModuliError, match="a list of at least two points"):
             gm.quality_along([start])
+
+
+def test_soft_fingers_and_the_other_norm_along_a_curve():
+    start, end = (MODELS["e"], gm.Grasp([0.5] * 3, [0, 2, 4])), (
+        MODELS["f"], gm.Grasp([0.4, 0.5, 0.6], [0.1, 2.1, 4.1]))  # fmt: skip
+    measures: list[dict[str, Any]] = [
+        {"torsion": 0.2}, {"norm": "each"}, {"torsion": 0.1, "norm": "each"}
+    ]  # fmt: skip
+    for options in measures:
+        along = gm.quality_along(start, end, samples=4, **options)
+        by_function = gm.quality_along(
+            lambda t: gm.interpolate(start, end, t), samples=4, **options
+        )
+        plain = gm.quality_along(start, end, samples=4)
+        for k, t in enumerate(along.t):
+            expected = gm.quality(gm.place(*gm.interpolate(start, end, float(t))), **options)
+            assert along.quality[k] == pytest.approx(expected, abs=1e-9)
+        np.testing.assert_allclose(along.quality, by_function.quality, rtol=0, atol=1e-9)
+        assert (along.quality > plain.quality).all()
+    with pytest.raises(gm.GraspModuliError, match='norm must be "sum" or "each", got 3'):
+        gm.quality_along(start, end, norm=3)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(gm.GraspModuliError, match="torsion must be"):
+        gm.quality_along(start, end, torsion=-1.0)

@@ -10,8 +10,9 @@ grasps                 :class:`Grasp`, :func:`place`, :func:`grasp_gradient`
 the moduli space       :func:`surface_distance`, :func:`placed_distance`, :func:`distance`,
                        :func:`interpolate`, :func:`quality_along`, :func:`transfer`,
                        :func:`sample_combinations`, :func:`closest_combination`
+random configurations  :func:`sample_configurations`, :func:`sample_nearby`
 guarantees             :func:`certified_radius`, :func:`certify_transfer`,
-                       :func:`transfer_bound`
+                       :func:`transfer_bound`, :func:`epsilon`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`
@@ -28,6 +29,11 @@ from ._batches import GraspLike as GraspLike
 from ._batches import contact_frames as contact_frames
 from ._core import GraspModuliError as GraspModuliError
 from ._extras import MissingExtraError as MissingExtraError
+from .configurations import Configurations as Configurations
+from .configurations import sample_configurations as sample_configurations
+from .configurations import sample_nearby as sample_nearby
+from .epsilon import Epsilon as Epsilon
+from .epsilon import epsilon as epsilon
 from .fitting import Fit as Fit
 from .fitting import ObjectGrasp as ObjectGrasp
 from .fitting import Residual as Residual

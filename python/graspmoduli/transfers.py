@@ -248,6 +248,8 @@ def quality_along(
     samples: int = 100,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
+    norm: str = "sum",
 ) -> QualityAlong:
     """Q_l along a curve in the Grasp Moduli Space, and the lowest point that was found.
 
@@ -268,10 +270,23 @@ def quality_along(
         missed, and of two dips in one interval the deeper one may be.
     friction, edges
         As in :func:`graspmoduli.quality`; friction positive, a number or one per finger, (m,).
+    torsion, norm
+        As in :func:`graspmoduli.quality`: soft fingers, and Q'_l in the place of Q_l.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle, vase = gm.shapes.model("bottle"), gm.shapes.model("vase")
+    >>> best = gm.synthesize(bottle, top=1)[0].grasp
+    >>> hard = gm.quality_along((bottle, best), (vase, best), samples=10)
+    >>> soft = gm.quality_along((bottle, best), (vase, best), samples=10, torsion=0.1)
+    >>> hard.worst_quality <= soft.worst_quality
+    True
     """
     n = count("samples", samples, 1, MOST_STEPS)
+    measure = {"torsion": torsion, "norm": norm}
     if callable(start):
-        pieces = [_by_function(start, friction, edges)]
+        pieces = [_by_function(start, friction, edges, measure)]
     else:
         points = [start, end] if end is not None else start
         if not isinstance(points, list | tuple) or len(points) < 2:
@@ -280,7 +295,7 @@ def quality_along(
                 f"points, or a function of t, got {brief(start)}"
             )
         points = [a_point("start" if k == 0 else "end", p) for k, p in enumerate(points)]
-        pieces = [_by_line(*pair, friction, edges) for pair in itertools.pairwise(points)]
+        pieces = [_by_line(*pair, friction, edges, measure) for pair in itertools.pairwise(points)]
     n = -(-n // len(pieces)) * len(pieces)
 
     def at(t: Floats) -> Floats:
@@ -322,20 +337,20 @@ def quality_along(
 
 
 def _by_function(
-    curve: Callable[[float], Point], friction: ArrayLike, edges: int
+    curve: Callable[[float], Point], friction: ArrayLike, edges: int, measure: dict[str, Any]
 ) -> Callable[[Floats], Floats]:
     """Q_l at many t of a curve that is given as a function."""
 
     def at(t: Floats) -> Floats:
         placed = [place(*a_point("start(t)", curve(float(x)))) for x in t]
         hand = fingers(friction, edges, len(placed[0].contacts))
-        return quality(placed, friction=carried(hand), edges=edges)
+        return quality(placed, friction=carried(hand), edges=edges, **measure)
 
     return at
 
 
 def _by_line(
-    start: Point, end: Point, friction: ArrayLike, edges: int
+    start: Point, end: Point, friction: ArrayLike, edges: int, measure: dict[str, Any]
 ) -> Callable[[Floats], Floats]:
     """Q_l at many t of the curve of Eq. (III.1)."""
     (first, g), (last, h) = start, end
@@ -362,7 +377,7 @@ def _by_line(
         radial, across = -height, height * ft / f
         normals = np.stack([radial * c - across * s, radial * s + across * c, fu], axis=-1)
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        return quality(contacts, normals, center(t), friction=carried(hand), edges=edges)
+        return quality(contacts, normals, center(t), friction=carried(hand), edges=edges, **measure)
 
     return at
 

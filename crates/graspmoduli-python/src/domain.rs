@@ -3,7 +3,9 @@
 use crate::{cone, raise, table};
 use graspmoduli::contact::Contact;
 use graspmoduli::domain::{self, Configuration, Stream};
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{
+    PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 /// c_1, c_2, c_3, n_1, n_2, n_3, z.
@@ -61,6 +63,48 @@ pub fn grasps_near<'py>(
         near
     });
     table(py, near)
+}
+
+/// Fills rows c_1, …, c_m, n_1, …, n_m, z with configurations uniform in D(r).
+#[pyfunction]
+pub fn fill_configurations(
+    py: Python<'_>,
+    mut rows: PyReadwriteArray2<'_, f64>,
+    radius: f64,
+    seed: u64,
+) -> PyResult<()> {
+    let width = rows.shape()[1];
+    let rows = rows.as_slice_mut()?;
+    py.detach(|| {
+        let mut stream = Stream::new(seed, 0);
+        for row in rows.chunks_exact_mut(width) {
+            stream.configuration(radius, row);
+        }
+    });
+    Ok(())
+}
+
+/// The stream of neighbours, apart from those of the configurations.
+const NEARBY: u64 = u64::MAX;
+
+/// Fills rows with configurations uniform in N_ε of a given one.
+#[pyfunction]
+pub fn fill_nearby(
+    py: Python<'_>,
+    given: PyReadonlyArray1<'_, f64>,
+    epsilon: f64,
+    mut rows: PyReadwriteArray2<'_, f64>,
+    seed: u64,
+) -> PyResult<()> {
+    let given = given.as_slice()?;
+    let rows = rows.as_slice_mut()?;
+    py.detach(|| {
+        let mut stream = Stream::new(seed, NEARBY);
+        for row in rows.chunks_exact_mut(given.len()) {
+            stream.nearby(given, epsilon, row);
+        }
+    });
+    Ok(())
 }
 
 /// Of the first `count` grasps of a stream: unstable ones, those strictly outside, numbers at or

@@ -438,7 +438,9 @@ mod _core {
     }
 
     #[pymodule_export]
-    use super::domain::{grasps_near, random_grasps, smallest_nearby, survey};
+    use super::domain::{
+        fill_configurations, fill_nearby, grasps_near, random_grasps, smallest_nearby, survey,
+    };
     #[pymodule_export]
     use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! The domain D(1) of Sec. III and IV.A: random grasps in it and near each other.
+//! The domain D(r) of Sec. III and IV.A: random grasps in it and near each other.
 //!
 //! Random numbers are counter-based (ChaCha8): the seed and the number of a stream name them, and
 //! only arithmetic that rounds alike everywhere turns them into grasps, so a piece of work gives the
@@ -101,6 +101,46 @@ impl Stream {
             center: grasp.center + epsilon * self.ball(),
         }
     }
+}
+
+/// Numbers of a configuration of m contacts: c_1, …, c_m, n_1, …, n_m, z.
+pub const fn numbers(m: usize) -> usize {
+    6 * m + 3
+}
+
+impl Stream {
+    /// Uniform in D(r), any number of contacts: fills a row of [`numbers`]. Three contacts in D(1)
+    /// are those of [`Stream::grasp`].
+    pub fn configuration(&mut self, radius: f64, row: &mut [f64]) {
+        let m = row.len() / 6;
+        for i in 0..m {
+            let (point, normal) = (self.ball(), self.sphere());
+            put(row, i, radius * point);
+            put(row, m + i, normal);
+        }
+        put(row, 2 * m, radius * self.ball());
+    }
+
+    /// Uniform in N_ε of a configuration given as such a row. Three contacts are those of
+    /// [`Stream::near`]. The chord of two unit vectors is at most 2, whatever ε.
+    pub fn nearby(&mut self, given: &[f64], epsilon: f64, row: &mut [f64]) {
+        let m = given.len() / 6;
+        for i in 0..m {
+            let point = take(given, i) + epsilon * self.ball();
+            let normal = self.cap(take(given, m + i), epsilon.min(2.0));
+            put(row, i, point);
+            put(row, m + i, normal);
+        }
+        put(row, 2 * m, take(given, 2 * m) + epsilon * self.ball());
+    }
+}
+
+fn take(row: &[f64], number: usize) -> DVec3 {
+    DVec3::from_slice(&row[3 * number..])
+}
+
+fn put(row: &mut [f64], number: usize, vector: DVec3) {
+    vector.write_to_slice(&mut row[3 * number..]);
 }
 
 /// What was found of uniform grasps in D(1).
@@ -235,6 +275,25 @@ mod tests {
                 13809088191485145856
             ]
         );
+    }
+
+    #[test]
+    fn rows_of_three_contacts_are_the_grasps() {
+        let flat = |grasp: &Configuration| {
+            let points = grasp.contacts.map(|c| c.point.to_array());
+            let normals = grasp.contacts.map(|c| c.normal.to_array());
+            [points, normals, [grasp.center.to_array(); 3]].concat()[..7].concat()
+        };
+        let (mut one, mut other) = (Stream::new(4, 9), Stream::new(4, 9));
+        let mut row = vec![0.0; numbers(3)];
+        for epsilon in [0.01, 0.5, 2.0] {
+            let grasp = one.grasp();
+            other.configuration(1.0, &mut row);
+            assert_eq!(row, flat(&grasp));
+            let given = row.clone();
+            other.nearby(&given, epsilon, &mut row);
+            assert_eq!(row, flat(&one.near(&grasp, epsilon)));
+        }
     }
 
     #[test]
