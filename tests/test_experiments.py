@@ -157,8 +157,8 @@ class TestWorstNeighbours:
                 for row in (found.grasp, found.neighbour)
             )
             options = {"friction": cone.friction, "edges": cone.edges}
-            assert grasp.quality(**options) >= 0.02
-            assert near.quality(**options) == found.smallest
+            assert gm.quality(grasp, **options) >= 0.02
+            assert gm.quality(near, **options) == found.smallest
         scale = replace(TINY, friction=0.3, edges=5)
         chosen = random_grasps._good(0.05, scale)
         assert (gm.quality(*split(chosen), friction=0.3, edges=5) >= 0.05).all()

@@ -49,7 +49,7 @@ def test_a_surface_from_two_sides():
     plain = plotting.plot_surface(SURFACES["e"], title="a name")
     assert "a name" in texts(plain)
     figure = plotting.plot_surface(SURFACES["e"], GRASP, friction=0.7, edges=6, title="a name")
-    value = gm.place(SURFACES["e"], GRASP).quality(friction=0.7, edges=6)
+    value = gm.quality(gm.place(SURFACES["e"], GRASP), friction=0.7, edges=6)
     assert f"= {value:.4f}" in texts(figure)
     assert "Q_{6}" in texts(figure)
     assert "μ = 0.7" in texts(figure)
@@ -96,7 +96,7 @@ def test_a_path_at_one_scale_with_lost_grasps_named():
     for axes, t in zip(figure.axes, np.linspace(0, 1, 4), strict=True):
         check_limits(axes)
         surface, grasp = gm.interpolate((SURFACES["a"], GRASP), (SURFACES["j"], GRASP), float(t))
-        value = gm.place(surface, grasp).quality()
+        value = gm.quality(gm.place(surface, grasp))
         assert axes.get_title() == f"t = {t:.2g}\n" + (f"Q = {value:.3f}" if value else "lost")
     lost = gm.Grasp([0.5, 0.5, 0.5], [0.0, 0.1, 0.2])
     assert "lost" in texts(plotting.plot_row([(SURFACES["a"], lost)], ["here"]))

@@ -7,8 +7,10 @@ import pytest
 
 import graspmoduli as gm
 import reference
+from conftest import ROOT
 
 NOT_ROUND = "efghijkl"
+OBJECTS = ROOT / "examples" / "objects"
 
 
 def exhaustive(surface, u, theta, **options):
@@ -142,6 +144,20 @@ class TestSearch:
             gm.best_grasps(surface, [0.1, 0.5], [0, 2])
 
 
+def _same_grasps(one, two, turns=1):
+    """The same in the same order; where Q is flat the place is less certain than the quality.
+
+    On a surface of revolution a grasp may come turned by an eighth: the friction cones' eight edges
+    turn with it, so that is the same but for rounding, and no start is better than another.
+    """
+    assert len(one) == len(two) > 0
+    for a, b in zip(one, two, strict=True):
+        assert a.quality == pytest.approx(b.quality, rel=1e-8)
+        by = 2 * np.pi / turns * np.round((a.grasp.theta - b.grasp.theta)[0] / (2 * np.pi / turns))
+        turn = (a.grasp.theta - b.grasp.theta - by + np.pi) % (2 * np.pi) - np.pi
+        assert np.abs([a.grasp.u - b.grasp.u, turn]).max() < 1e-4
+
+
 class TestSynthesis:
     @pytest.mark.parametrize("name", NOT_ROUND)
     def test_is_at_least_as_good_as_the_best_of_50_samples(self, name):
@@ -154,7 +170,8 @@ class TestSynthesis:
         surface = gm.shapes.MODELS[name]
         grasps = gm.synthesize(surface, top=4)
         values = [g.quality for g in grasps]
-        assert values == sorted(values, reverse=True)
+        # Equal ones come in the order of their contacts.
+        assert (np.diff(values) <= 1e-6 * values[0]).all()
         assert len(grasps) >= 2
         points = []
         for ranked in grasps:
@@ -170,16 +187,47 @@ class TestSynthesis:
             )
             assert apart > 0.15 * surface.radius_about(surface.center_of_mass) - 1e-9
 
-    @pytest.mark.parametrize("name", ["e", "j", "l"])
-    def test_the_best_is_a_local_maximum(self, name):
+    @pytest.mark.parametrize("name", gm.shapes.MODELS)
+    def test_nothing_near_a_grasp_is_better(self, name):
         surface = gm.shapes.MODELS[name]
-        best = gm.synthesize(surface, top=1)[0]
         rng = np.random.default_rng(0)
-        steps = rng.normal(size=(3000, 2, 3)) * 10.0 ** rng.uniform(-4, -2, (3000, 1, 1))
-        u = np.clip(best.grasp.u + steps[:, 0], 0, 1)
-        theta = best.grasp.theta + steps[:, 1]
-        q = gm.quality(surface.points(u, theta), surface.normals(u, theta), surface.center_of_mass)
-        assert q.max() <= best.quality * 1.003
+        for best in gm.synthesize(surface, top=2):
+            steps = rng.normal(size=(10_000, 2, 3))
+            steps *= 10.0 ** rng.uniform(-6, -1, (10_000, 1, 1)) / np.linalg.norm(
+                steps, axis=(1, 2), keepdims=True
+            )
+            u = np.clip(best.grasp.u + steps[:, 0], 0, 1)
+            theta = best.grasp.theta + steps[:, 1]
+            placed = surface.points(u, theta), surface.normals(u, theta)
+            assert gm.quality(*placed, surface.center_of_mass).max() <= best.quality * (1 + 1e-5)
+            again = gm.transfer(surface, best.grasp, surface, "ascent")
+            assert again.quality <= best.quality * (1 + 1e-5)
+
+    @pytest.mark.parametrize("name", gm.shapes.MODELS)
+    def test_the_last_bits_of_a_surface_do_not_choose_another_grasp(self, name):
+        surface = gm.shapes.MODELS[name]
+        rng = np.random.default_rng(1)
+        noise = 1.0 + 1e-14 * rng.uniform(-1, 1, surface.coefficients.shape)
+        other = gm.Surface.from_coefficients(
+            surface.coefficients * noise, surface.bottom, surface.top
+        )
+        turns = 1 if name in NOT_ROUND else 8
+        _same_grasps(gm.synthesize(surface), gm.synthesize(other), turns)
+
+    @pytest.mark.parametrize("path", sorted(OBJECTS.glob("*.ply")), ids=lambda path: path.stem)
+    def test_nor_do_the_last_bits_of_a_fit(self, path):
+        fit = gm.fit(path)
+        surface, rng = fit.surface, np.random.default_rng(2)
+        noise = 1.0 + 1e-14 * rng.uniform(-1, 1, surface.coefficients.shape)
+        other = gm.Surface.from_coefficients(
+            surface.coefficients * noise, surface.bottom, surface.top
+        )
+        one, two = (gm.synthesize(s, allowed=fit.allowed, top=3) for s in (surface, other))
+        _same_grasps(one, two)
+
+    def test_contacts_come_in_order_of_height(self):
+        for ranked in gm.synthesize(gm.shapes.MODELS["k"]):
+            assert (np.diff(ranked.grasp.u) > -1e-3).all()
 
     def test_same_seed_same_bits(self):
         surface = gm.shapes.MODELS["i"]
@@ -215,7 +263,7 @@ class TestSynthesis:
             found = gm.synthesize(surface, friction=friction)
             for ranked in found:
                 placed = gm.place(surface, ranked.grasp)
-                assert ranked.quality == pytest.approx(placed.quality(friction=friction)) != 0.0
+                assert ranked.quality == pytest.approx(gm.quality(placed, friction=friction)) != 0.0
             best.append(found[0].quality if found else 0.0)
         assert best == sorted(best)
         assert best[1] > 0.0

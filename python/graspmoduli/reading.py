@@ -28,7 +28,7 @@ SMALLEST_PART = 0.05
 #: Noise of more than this share is worth a warning.
 MUCH_NOISE = 0.01
 #: Extents between which products of several lengths neither overflow nor vanish.
-LEAST_EXTENT, GREATEST_EXTENT = 1e-50, 1e50
+LEAST_EXTENT, GREATEST_EXTENT = 1e-45, 1e45
 #: A mesh whose area is more times that of the box around it is no surface but a heap of triangles.
 MOST_AREA = 8.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,

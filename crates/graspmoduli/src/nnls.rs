@@ -45,11 +45,13 @@ fn residual<const N: usize>(columns: &[[f64; N]], weights: &[f64], target: [f64;
 pub(crate) fn nonnegative<const N: usize>(columns: &[[f64; N]], target: [f64; N]) -> Vec<f64> {
     let mut weights = vec![0.0; columns.len()];
     let mut passive: Vec<usize> = Vec::with_capacity(N);
+    // Columns that depend on the passive ones, and so cannot lower the residual beside them.
+    let mut dependent: Vec<usize> = Vec::new();
     // Each round lowers the residual; the bound only guards against cycling by rounding.
     for _ in 0..4 * (columns.len() + N) {
         let r = residual(columns, &weights, target);
         let candidate = (0..columns.len())
-            .filter(|k| !passive.contains(k))
+            .filter(|k| !passive.contains(k) && !dependent.contains(k))
             .map(|k| (k, -dot(&columns[k], &r)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((entering, slope)) = candidate else {
@@ -59,12 +61,13 @@ pub(crate) fn nonnegative<const N: usize>(columns: &[[f64; N]], target: [f64; N]
             return weights;
         }
         passive.push(entering);
+        let Some(mut trial) = least_squares(columns, &passive, target) else {
+            passive.pop();
+            dependent.push(entering);
+            continue;
+        };
+        dependent.clear();
         loop {
-            let Some(trial) = least_squares(columns, &passive, target) else {
-                // Dependent on the others: it cannot lower the residual.
-                passive.retain(|&k| k != entering);
-                return weights;
-            };
             // As far towards the trial as all weights stay positive.
             let mut share = 1.0;
             let mut leaving = None;
@@ -85,8 +88,13 @@ pub(crate) fn nonnegative<const N: usize>(columns: &[[f64; N]], target: [f64; N]
             for (position, &k) in passive.iter().enumerate() {
                 weights[k] += share * (trial[position] - weights[k]);
             }
-            match leaving {
-                Some(position) => weights[passive.swap_remove(position)] = 0.0,
+            let Some(position) = leaving else {
+                break;
+            };
+            weights[passive.swap_remove(position)] = 0.0;
+            // Fewer columns than independent ones are independent too, but for rounding.
+            match least_squares(columns, &passive, target) {
+                Some(fewer) => trial = fewer,
                 None => break,
             }
         }
@@ -162,6 +170,18 @@ mod tests {
             Some([0.0, 0.0])
         );
         assert_eq!(shortest_step::<1, 2>(&[[1.0], [-1.0]], &[1.0, 1.0]), None);
+    }
+
+    #[test]
+    fn a_dependent_column_does_not_keep_the_others_out() {
+        // The second is the first but for rounding, and longer: the largest slope, and no use.
+        let columns = [[1.0, 0.0, 1e-3], [2.0, 1e-13, 2e-3], [0.0, 1.0, 0.0]];
+        let target = [1.0, 0.5, 0.0];
+        let weights = nonnegative(&columns, target);
+        let r = residual(&columns, &weights, target);
+        for column in &columns {
+            assert!(dot(column, &r) > -1e-9, "{weights:?}");
+        }
     }
 
     #[test]

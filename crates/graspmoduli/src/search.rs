@@ -46,6 +46,7 @@ pub struct Ranked {
 ///
 /// `progress(done, total)` is called now and then and at the end from the calling thread, in
 /// subsets, and may ask to stop: then the answer is [`Error::Interrupted`].
+#[expect(clippy::too_many_arguments, reason = "what to search among, and how")]
 pub fn best_subsets(
     contacts: &[Contact],
     frictions: &[f64],

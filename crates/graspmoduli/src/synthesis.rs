@@ -5,8 +5,12 @@
 //! 2. The best of them, turned to several angles about the axis and judged by their naïve transfer
 //!    to S, start on π(S) and climb in Q while the surface deforms along (1 − t) π(S) + t S.
 //! 3. On S itself each climbs on; the best different ones climb to a local maximum.
+//!
+//! Objects are often symmetric, so many grasps are equally good but for rounding. Rounding must not
+//! choose among them: the starts are moved off symmetric places by a fixed small amount, and equal
+//! grasps come in a fixed order.
 
-use crate::ascent::{Climber, Coordinates, Effort, Region};
+use crate::ascent::{Climber, Coordinates, Effort, Region, grains, order};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::Evaluator;
@@ -38,11 +42,13 @@ const APPROACH: Effort = Effort {
     steps: 3,
     gain: 1e-2,
 };
-/// To the local maximum.
-const ARRIVAL: Effort = Effort {
-    steps: 20,
-    gain: 5e-4,
-};
+/// Qualities this near to each other, relatively, are equal.
+const TIE: f64 = 1e-6;
+/// Starts are moved by this in (u, θ): much more than rounding, much less than what matters.
+const NUDGE: [f64; 6] = [7e-4, -1e-3, -5e-4, 6e-4, 3e-4, 9e-4];
+
+/// A grasp with its Q_l.
+type Found = (Coordinates, f64);
 
 /// A grasp on a surface by its contact coordinates, and its Q_l.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,9 +59,10 @@ pub struct Synthesized {
     pub quality: f64,
 }
 
-/// The `top` best grasps found, best first, no two at the same place.
+/// The `top` best grasps found, best first, equal ones in the order of their contacts, no two at the
+/// same place. Contacts come in ascending order of u.
 ///
-/// `most_starts` grasps of the heuristic are followed.
+/// At most `most_starts` grasps of the heuristic are followed.
 /// If the deformation from π(S) finds fewer than three grasps, the ascent also starts from the best
 /// triples of area-uniform samples; `square` holds points of the unit square to make them of.
 pub fn synthesize(
@@ -90,6 +97,9 @@ fn within_pool(
     most_starts: usize,
     square: &[[f64; 2]],
 ) -> Result<Vec<Synthesized>, Error> {
+    if top == 0 {
+        return Ok(Vec::new());
+    }
     let target = Climber {
         surface,
         center: center_of_mass,
@@ -118,7 +128,7 @@ fn within_pool(
             .climb(evaluator, at, APPROACH)
             .or_else(|| target.climb(evaluator, *start, APPROACH))
     };
-    let mut found: Vec<(Coordinates, f64)> = starts
+    let mut found: Vec<Found> = starts
         .par_iter()
         .map_init(|| Evaluator::new(cone), approach)
         .flatten()
@@ -138,7 +148,7 @@ fn within_pool(
             center_of_mass,
             cone,
             3,
-            8 * top,
+            top.saturating_mul(8).min(triples_of(contacts.len())),
             1,
             |_, _| ControlFlow::Continue(()),
         )?;
@@ -158,35 +168,71 @@ fn within_pool(
         );
     }
     // Grasps that are different so far may still climb to the same place.
-    let candidates = different(&target, found, apart, top + top.min(3));
-    let arrived = candidates
-        .par_iter()
-        .map_init(
-            || Evaluator::new(cone),
-            |evaluator, (at, quality)| {
-                target
-                    .climb(evaluator, *at, ARRIVAL)
-                    .unwrap_or((*at, *quality))
-            },
-        )
-        .collect();
-    let best = different(&target, arrived, apart, top);
+    let candidates = different(&target, found, apart, top.saturating_add(top.min(3)));
+    let arrived = climbed(cone, candidates, |evaluator, at| {
+        target.arrive(evaluator, at)
+    });
+    let mut first = different(&target, arrived, apart, usize::MAX);
+    let others = first.split_off(top.min(first.len()));
+    let settle = |grasps| {
+        climbed(cone, grasps, |evaluator, at| {
+            target.to_maximum(evaluator, at)
+        })
+    };
+    let mut settled = settle(first);
+    let mut best = different(&target, settled.clone(), apart, top);
+    if best.len() < top {
+        settled.extend(settle(others));
+        best = different(&target, settled, apart, top);
+    }
+    let mut evaluator = Evaluator::new(cone);
     Ok(best
         .into_iter()
-        .map(|(coordinates, quality)| Synthesized {
-            coordinates,
-            quality,
+        .map(|(at, _)| {
+            let coordinates = in_order(at);
+            let contacts = coordinates.map(|[u, theta]| surface.contact(u, theta));
+            Synthesized {
+                coordinates,
+                quality: evaluator.quality(&contacts, center_of_mass),
+            }
         })
         .collect())
 }
 
+/// How many sets of three there are among so many.
+fn triples_of(count: usize) -> usize {
+    (0..3).fold(1usize, |product, i| {
+        product.saturating_mul(count.saturating_sub(i)) / (i + 1)
+    })
+}
+
+/// Where grasps come to, in parallel; those that do not hold stay where they are.
+fn climbed(
+    cone: &FrictionCone,
+    grasps: Vec<Found>,
+    climb: impl Fn(&mut Evaluator, Coordinates) -> Option<Found> + Sync,
+) -> Vec<Found> {
+    grasps
+        .into_par_iter()
+        .map_init(
+            || Evaluator::new(cone),
+            |evaluator, grasp| climb(evaluator, grasp.0).unwrap_or(grasp),
+        )
+        .collect()
+}
+
 /// Grasps of the heuristic on π(S), turned about the axis: the `most` best on the target.
 fn starts(target: &Climber, cone: &FrictionCone, most: usize) -> Vec<Coordinates> {
+    // There are no more than this.
+    let most = most.min(2 * HEIGHTS.pow(3) * TURNS);
+    if most == 0 {
+        return Vec::new();
+    }
     let round = target.surface.project();
     let center = round.integrals_by_simpson(20).center_of_mass;
     // Angles of the three contacts; the second and third are interchangeable.
     let arrangements = [[0.0, PI, PI], [0.0, TAU / 3.0, 2.0 * TAU / 3.0]];
-    let turned: Vec<Vec<(Coordinates, f64)>> = arrangements
+    let turned: Vec<Vec<Found>> = arrangements
         .par_iter()
         .map(|angles| {
             let heights = best_heights(&round, center, cone, *angles, most);
@@ -197,7 +243,10 @@ fn starts(target: &Climber, cone: &FrictionCone, most: usize) -> Vec<Coordinates
     for (at, quality) in turned.into_iter().flatten() {
         best.insert(at, quality, |_, _| false);
     }
-    best.entries.into_iter().map(|(at, _)| at).collect()
+    best.entries
+        .into_iter()
+        .map(|(at, _)| target.moved(&at, &NUDGE))
+        .collect()
 }
 
 fn three(ranked: &Ranked) -> [usize; 3] {
@@ -228,11 +277,15 @@ fn best_heights(
         .flat_map(|a| outward().flat_map(move |b| outward().map(move |c| [a, b, c])))
         .filter(wanted)
         .map(|[a, b, c]| [a, HEIGHTS + b, 2 * HEIGHTS + c]);
+    let mut found: Vec<([usize; 3], f64)> = best_of(&contacts, center, cone, 3 * most, triples)
+        .iter()
+        .map(|ranked| (three(ranked).map(|i| i % HEIGHTS), ranked.quality))
+        .collect();
+    equals_by(&mut found, |levels| *levels);
     let mut best: Best<[f64; 3]> = Best::new(most);
-    for ranked in best_of(&contacts, center, cone, 2 * most, triples) {
-        let heights = three(&ranked).map(|i| height(i % HEIGHTS));
+    for (levels, quality) in found {
         // Grasps at neighbouring heights climb to the same place.
-        best.insert(heights, ranked.quality, |x, y| {
+        best.insert(levels.map(height), quality, |x, y| {
             (0..3).all(|i| (x[i] - y[i]).abs() < 1.5 / (HEIGHTS - 1) as f64)
         });
     }
@@ -249,7 +302,7 @@ fn best_turns(
     angles: [f64; 3],
     heights: &[[f64; 3]],
     most: usize,
-) -> Vec<(Coordinates, f64)> {
+) -> Vec<Found> {
     let mut evaluator = Evaluator::new(cone);
     let mut best: Best<Coordinates> = Best::new(most);
     for heights in heights {
@@ -291,10 +344,10 @@ impl<T> Best<T> {
         }
     }
 
-    /// Of entries that are near each other only the best is kept.
+    /// Of entries that are near each other only the best is kept, of equal ones the first.
     fn insert(&mut self, entry: T, quality: f64, near: impl Fn(&T, &T) -> bool) {
-        let better = |q: f64| q >= quality;
-        if quality <= self.bar()
+        let better = |q: f64| q >= quality * (1.0 - TIE);
+        if quality <= self.bar() * (1.0 + TIE)
             || self
                 .entries
                 .iter()
@@ -328,25 +381,15 @@ fn stages(surface: &Surface, center_of_mass: DVec3) -> Vec<(Surface, DVec3)> {
 ///
 /// On a surface of revolution those that are the same after a turn about the axis come in only
 /// where too few others are found.
-fn different(
-    target: &Climber,
-    grasps: Vec<(Coordinates, f64)>,
-    apart: f64,
-    most: usize,
-) -> Vec<(Coordinates, f64)> {
+fn different(target: &Climber, grasps: Vec<Found>, apart: f64, most: usize) -> Vec<Found> {
     let mut kept = truly_different(target, grasps.clone(), apart, most);
     add_different(target, grasps, apart, most, false, &mut kept);
-    kept.sort_by(|a, b| b.1.total_cmp(&a.1));
+    rank(&mut kept);
     kept
 }
 
 /// As [`different`], but without those that are the same after a turn.
-fn truly_different(
-    target: &Climber,
-    grasps: Vec<(Coordinates, f64)>,
-    apart: f64,
-    most: usize,
-) -> Vec<(Coordinates, f64)> {
+fn truly_different(target: &Climber, grasps: Vec<Found>, apart: f64, most: usize) -> Vec<Found> {
     let mut kept = Vec::new();
     add_different(target, grasps, apart, most, target.round, &mut kept);
     kept
@@ -354,21 +397,37 @@ fn truly_different(
 
 fn add_different(
     target: &Climber,
-    mut grasps: Vec<(Coordinates, f64)>,
+    mut grasps: Vec<Found>,
     apart: f64,
     most: usize,
     turned: bool,
-    kept: &mut Vec<(Coordinates, f64)>,
+    kept: &mut Vec<Found>,
 ) {
-    // A stable sort: equal ones stay in their order.
-    grasps.sort_by(|a, b| b.1.total_cmp(&a.1));
+    rank(&mut grasps);
     for grasp in grasps {
-        let near =
-            |other: &(Coordinates, f64)| alike(target.surface, &grasp.0, &other.0, apart, turned);
+        let near = |other: &Found| alike(target.surface, &grasp.0, &other.0, apart, turned);
         if kept.len() < most && !kept.iter().any(near) {
             kept.push(grasp);
         }
     }
+}
+
+/// Best first, equal ones in the order of their contacts.
+fn rank(grasps: &mut [Found]) {
+    grasps.sort_by(|a, b| b.1.total_cmp(&a.1));
+    equals_by(grasps, |at| in_order(*at).map(grains));
+}
+
+/// Of entries that come best first, equal ones are put in the order of their keys.
+fn equals_by<T, K: Ord>(entries: &mut [(T, f64)], key: impl Fn(&T) -> K) {
+    for equal in entries.chunk_by_mut(|a, b| a.1 - b.1 <= TIE * a.1) {
+        equal.sort_by_cached_key(|(entry, _)| key(entry));
+    }
+}
+
+/// The contacts in ascending order of u, of θ where that is equal.
+fn in_order(at: Coordinates) -> Coordinates {
+    order(&at).map(|contact| at[contact])
 }
 
 fn alike(surface: &Surface, a: &Coordinates, b: &Coordinates, apart: f64, turned: bool) -> bool {

@@ -1,6 +1,6 @@
 //! Carrying a grasp from one surface to another along (1 − t) S + t S' (Sec. IV.D).
 
-use crate::ascent::{Anywhere, Climber, Coordinates, Effort, Region};
+use crate::ascent::{Anywhere, Climber, Coordinates, Effort, Region, noticeably};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::{Evaluator, Gradient};
@@ -134,61 +134,72 @@ impl Deformation {
     }
 
     /// A method of our own, for three contacts: on surfaces as near to each other as keeps the grasp
-    /// good, an ascent by all facets near the origin (see [`crate::ascent`]), then one to a local
-    /// maximum on the target; in few steps, in many and at once, and the best of these.
+    /// good, an ascent by all facets near the origin (see [`crate::ascent`]); in few steps, in many
+    /// and at once, and from the best of these to a local maximum on the target.
     ///
-    /// On the target contacts lie in `region`: from elsewhere they move to its nearest part.
+    /// On the target contacts lie in `region`: from elsewhere they move to its nearest part. Where it
+    /// allows none the grasp is lost, and ends with quality 0 at the coordinates that it came with.
     pub fn by_ascent(
         &self,
         grasps: &[Coordinates],
         cone: &FrictionCone,
         region: &dyn Region,
     ) -> Vec<Carried> {
+        let (surface, center) = self.at(1.0);
+        let target = Climber {
+            surface: &surface,
+            center,
+            region,
+            round: false,
+        };
         grasps
             .par_iter()
             .map_init(
                 || Evaluator::new(cone),
-                |evaluator, start| self.ascend(evaluator, *start, region),
+                |evaluator, start| self.ascend(evaluator, *start, &target),
             )
             .collect()
     }
 
-    /// The best of three ways: in few long steps, in many short ones, and at once.
-    fn ascend(
-        &self,
-        evaluator: &mut Evaluator,
-        start: Coordinates,
-        region: &dyn Region,
-    ) -> Carried {
+    /// The best of three ways, in few long steps, in many short ones and at once, and on to a local
+    /// maximum.
+    fn ascend(&self, evaluator: &mut Evaluator, start: Coordinates, target: &Climber) -> Carried {
         let before = evaluator.evaluations();
-        let mut best = self.ascend_in_steps(evaluator, start, region, 0.25);
+        let (mut at, mut path) = self.ascend_in_steps(evaluator, start, target, 0.25);
         for longest in [1.0 / 12.0, 1.0] {
-            let other = self.ascend_in_steps(evaluator, start, region, longest);
-            if other.reached() > best.reached() {
-                best = other;
+            let other = self.ascend_in_steps(evaluator, start, target, longest);
+            if noticeably(reached(&other.1), reached(&path)) {
+                (at, path) = other;
             }
         }
-        best.evaluations = evaluator.evaluations() - before;
-        best
+        if reached(&path) > 0.0
+            && let Some((better, quality)) = target.to_maximum(evaluator, at)
+        {
+            at = better;
+            path.pop();
+            path.push([1.0, quality]);
+        }
+        Carried {
+            coordinates: at.to_vec(),
+            path,
+            evaluations: evaluator.evaluations() - before,
+        }
     }
 
+    /// Where a grasp comes to, and (t, Q_l) on the way.
     fn ascend_in_steps(
         &self,
         evaluator: &mut Evaluator,
         start: Coordinates,
-        region: &dyn Region,
+        target: &Climber,
         longest: f64,
-    ) -> Carried {
+    ) -> (Coordinates, Vec<[f64; 2]>) {
         const SHORTEST: f64 = 1.0 / 64.0;
         /// The next surface is near enough if the grasp keeps this share of its quality there.
         const KEPT: f64 = 0.5;
         const ON_THE_WAY: Effort = Effort {
             steps: 2,
             gain: 1e-2,
-        };
-        const ARRIVAL: Effort = Effort {
-            steps: 24,
-            gain: 1e-4,
         };
         let mut at = start;
         let (surface, center) = self.at(0.0);
@@ -201,48 +212,57 @@ impl Deformation {
             } else {
                 t + step
             };
-            let (surface, center) = self.at(next);
             let arrived = next == 1.0;
-            let landing = if arrived {
-                at.map(|[u, theta]| {
-                    let lengths = surface.place(u, theta).tangents.map(DVec3::length);
-                    region.nearest([u, theta], lengths).unwrap_or([u, theta])
-                })
-            } else {
-                at
+            let stage = (!arrived).then(|| self.at(next));
+            let climber = match &stage {
+                Some((surface, center)) => &Climber {
+                    surface,
+                    center: *center,
+                    region: &Anywhere,
+                    round: false,
+                },
+                None => target,
             };
-            let carried = evaluator.quality(&contacts(&surface, &landing), center);
+            let Some(landing) = landing(&at, climber) else {
+                // Nothing of the target may be touched.
+                path.push([1.0, 0.0]);
+                break;
+            };
+            let carried = evaluator.quality(&contacts(climber.surface, &landing), climber.center);
             if carried < KEPT * quality && step > SHORTEST && longest < 1.0 {
                 step *= 0.5;
                 continue;
             }
-            let climber = Climber {
-                surface: &surface,
-                center,
-                region: if arrived { region } else { &Anywhere },
-                round: false,
-            };
-            let effort = if arrived { ARRIVAL } else { ON_THE_WAY };
             (at, quality) = (landing, carried);
-            if let Some((better, reached)) = climber.climb(evaluator, at, effort) {
-                (at, quality) = (better, reached);
+            let climbed = if arrived {
+                climber.arrive(evaluator, at)
+            } else {
+                climber.climb(evaluator, at, ON_THE_WAY)
+            };
+            if let Some(better) = climbed {
+                (at, quality) = better;
             }
             t = next;
             path.push([t, quality]);
             step = (1.5 * step).min(longest);
         }
-        Carried {
-            coordinates: at.to_vec(),
-            path,
-            evaluations: 0,
-        }
+        (at, path)
     }
 }
 
-impl Carried {
-    fn reached(&self) -> f64 {
-        self.path.last().map_or(0.0, |last| last[1])
+/// The allowed contacts nearest to these, if there are any.
+fn landing(at: &Coordinates, climber: &Climber) -> Option<Coordinates> {
+    let mut landing = *at;
+    for contact in &mut landing {
+        let [u, theta] = *contact;
+        let lengths = climber.surface.place(u, theta).tangents.map(DVec3::length);
+        *contact = climber.region.nearest(*contact, lengths)?;
     }
+    Some(landing)
+}
+
+fn reached(path: &[[f64; 2]]) -> f64 {
+    path.last().map_or(0.0, |last| last[1])
 }
 
 fn contacts(surface: &Surface, at: &[[f64; 2]]) -> Vec<Contact> {

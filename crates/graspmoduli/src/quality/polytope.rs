@@ -187,7 +187,7 @@ impl Coordinates for Own {
 
 impl Coordinates for Basis {
     fn own(&self, x: &Twist) -> Twist {
-        self.from_axes(x)
+        self.of_axes(x)
     }
 
     fn point(&self, point: &Twist) -> Twist {

@@ -25,6 +25,7 @@ const MOST_STEPS: usize = 500;
 const PIVOT: f64 = 1e-11;
 
 /// Where the origin is.
+#[expect(clippy::large_enum_variant, reason = "one at a time, on the stack")]
 pub(super) enum Position {
     /// In the interior of the hull: of the simplex of six of its points and the one inside.
     Surrounded(Basis),
@@ -194,7 +195,7 @@ impl Basis {
 
     /// A polar vertex in those coordinates, in the hull's own.
     #[inline]
-    pub fn from_axes(&self, x: &Twist) -> Twist {
+    pub fn of_axes(&self, x: &Twist) -> Twist {
         let mut own = [0.0; 6];
         for (row, share) in self.inverse.iter().zip(x) {
             own = add(&own, *share, row);
