@@ -276,7 +276,8 @@ def plot_simplex(
         )
     # Those below are drawn over those above.
     order = np.argsort(-inside[:, 2], kind="stable")
-    inside, held = inside[order], [None] * 3 + [held[k] for k in order]
+    inside = inside[order]
+    held = [None, None, None, *(held[k] for k in order)]
     figure = Figure(figsize=(8.0, 7.2), dpi=150, facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 0.95))
     triangle = np.array([[0.14, 0.16], [0.86, 0.16], [0.5, 0.80]])

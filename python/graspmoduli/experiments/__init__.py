@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 from .._arrays import cores, count
 from .._core import GraspModuliError
-from . import carrying, deformations, pictures, random_grasps, revolution
 from ..shapes import MODELS
+from . import carrying, deformations, pictures, random_grasps, revolution
 from .cluster import run_on_dask
 from .engine import run_on_threads
 from .report import Outcome, Row, write

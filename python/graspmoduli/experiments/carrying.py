@@ -16,12 +16,12 @@ from .common import Pieces, Seconds, by_seed, counts, over_seeds, own_grasp, rep
 from .report import BEYOND, Outcome, Row
 from .settings import Scale
 
-#: By name: the method and its options. The paper's takes finite differences.
-METHODS: dict[str, tuple[str, dict[str, float]]] = {
-    "naïve": ("naive", {}),
-    "the paper's gradient method": ("gradient", {"difference": 1e-5}),
-    "the same with exact derivatives": ("gradient", {}),
-    "our ascent": ("ascent", {}),
+#: By name: the method and the h of its finite differences, exact derivatives if None.
+METHODS: dict[str, tuple[str, float | None]] = {
+    "naïve": ("naive", None),
+    "the paper's gradient method": ("gradient", 1e-5),
+    "the same with exact derivatives": ("gradient", None),
+    "our ascent": ("ascent", None),
 }
 NAIVE, PAPERS, EXACT, ASCENT = METHODS
 PAIRS = len(MODELS) ** 2
@@ -35,11 +35,11 @@ def fig10_piece(index: int, scale: Scale) -> dict[str, Any]:
     source = list(MODELS)[number]
     grasp, _ = own_grasp(MODELS[source], scale, seed)
     found: dict[str, Any] = {}
-    for name, (method, options) in METHODS.items():
+    for name, (method, difference) in METHODS.items():
         start = time.perf_counter()
         ends = [
             transfer(MODELS[source], grasp, target, method,
-                     friction=scale.friction, edges=scale.edges, **options)
+                     friction=scale.friction, edges=scale.edges, difference=difference)
             for target in MODELS.values()
         ]  # fmt: skip
         found[name] = {
