@@ -115,7 +115,7 @@ def surface_within(surface: Surface, weights: Floats, reach: float) -> tuple[flo
         apart = surface_distance(surface, target)
         # With its error: no surface is further.
         most = apart + apart.error
-        furthest = max(most, np.linalg.norm(surface.center_of_mass - target.center_of_mass))
+        furthest = max(most, float(np.linalg.norm(surface.center_of_mass - target.center_of_mass)))
         if furthest <= reach and t > best[0]:
             best = (t, most)
             if t == 1.0 or furthest > 0.99 * reach:
