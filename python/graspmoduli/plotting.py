@@ -48,6 +48,8 @@ LINES = (
     ("#56B4E9", (0, (5, 1, 1, 1, 1, 1))),
     ("#000000", (0, (6, 3))),
 )
+#: Of the window of a surface with a grasp on it, in :func:`plot_simplex`.
+HELD = 0.19
 #: Elevation of the eye above the horizon [rad].
 ELEVATION = 0.32
 
@@ -215,10 +217,7 @@ def plot_rows(
         value = quality(place(surface, grasp), friction=friction, edges=edges)
         # Lost is said in words and in colour.
         told, color = (f"Q = {value:.3f}", "0.15") if value > 0.0 else ("lost", "#D55E00")
-        figure.text(
-            (column + 0.5) / n, bottom / high, f"{label}\n{told}", ha="center", va="top",
-            fontsize=10, color=color,
-        )  # fmt: skip
+        axes.set_title(f"{label}\n{told}", fontsize=10, color=color, y=0.0, va="top", pad=0.0)
         bounds.append((*axes.get_xlim(), *axes.get_ylim()))
     low_x, high_x, low_y, high_y = np.array(bounds).T
     # Room for the arrows.
@@ -280,7 +279,7 @@ def plot_simplex(
     held = [None, None, None, *(held[k] for k in order)]
     figure = Figure(figsize=(8.0, 7.2), dpi=150, facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 0.95))
-    triangle = np.array([[0.14, 0.16], [0.86, 0.16], [0.5, 0.80]])
+    triangle = np.array([[0.14, 0.19], [0.86, 0.19], [0.5, 0.83]])
     axes.plot(*triangle[[0, 1, 2, 0]].T, color="0.75", linewidth=1.2, zorder=0)
     places = inside @ triangle
     axes.plot(*places.T, "o", color=NET, markersize=3, zorder=1)
@@ -290,14 +289,16 @@ def plot_simplex(
     shapes = [*corners, *(combine(corners, w) for w in inside)]
     # All at one scale: a window of the same size around each.
     reach = max(s.radius_about((0.0, 0.0, 0.5 * (s.bottom + s.top))) for s in shapes)
-    camera = Camera(0.6, ELEVATION)
     for index, (surface, (x, y)) in enumerate(zip(shapes, [*triangle, *places], strict=True)):
         corner = index < 3
-        size = 0.24 if corner else 0.115
+        grasp = held[index]
+        size = 0.24 if corner else 0.115 if grasp is None else HELD
         window = figure.add_axes((x - 0.5 * size, 0.95 * y - 0.5 * size, size, size))
         scene = Scene()
-        grasp = held[index]
-        add_body(scene, camera, surface, "#8fb0c9" if corner else BODY, 32 if corner else 20)
+        # A grasp is seen from its own side.
+        camera = Camera(0.6 if grasp is None else azimuth_of(surface, grasp), ELEVATION)
+        detail = 20 if grasp is None and not corner else 32
+        add_body(scene, camera, surface, "#8fb0c9" if corner else BODY, detail)
         if grasp is None:
             scene.draw(window)
         else:

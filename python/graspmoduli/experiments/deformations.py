@@ -241,7 +241,9 @@ def _fig8_picture(found: dict[str, Any]) -> Figure:
     labels = ["the grasp\nd = 0"]
     ball, reach = MODULI, REACHES[-1]
     for kind in KINDS:
-        case = found["moved"][_key(ball, reach, kind)][0]
+        # The first that goes as far: some surfaces of the simplex are nearer.
+        cases = found["moved"][_key(ball, reach, kind)]
+        case = next((c for c in cases if c["distance"] > 0.95 * reach), cases[0])
         points.append((deformed(surface, case["weights"], case["towards"]), Grasp(*case["grasp"])))
         labels.append(f"{kind}\nd = {case['distance']:.3f}")
     return plot_row(points, labels)

@@ -21,9 +21,9 @@ from .settings import Scale
 
 #: Fig. 1: uniform samples that are drawn, of how many candidates.
 SHOWN, CANDIDATES = 8, 400
-#: Two surfaces of Fig. 1 do not cover each other if their weights differ so much, and a corner
-#: takes more room.
-APART, FROM_CORNER = 0.16, 0.30
+#: Two surfaces of Fig. 1 do not cover each other if their weights differ so much; a corner takes
+#: more room, and so does the surface with the grasp.
+APART, FROM_CORNER, FROM_GRASP = 0.16, 0.30, 0.22
 #: Fig. 4: from which model to which.
 ENDS = "aj"
 #: Fig. 3: what surfaces are combined of, a row each.
@@ -56,7 +56,7 @@ def _apart(first: Floats, candidates: Floats) -> Floats:
         # 1 is the square of their distance.
         to_corners = np.linalg.norm(weights - np.eye(3), axis=1) / np.sqrt(2.0)
         to_others = np.linalg.norm(weights - np.array(chosen), axis=1) / np.sqrt(2.0)
-        if to_corners.min() > FROM_CORNER and to_others.min() > APART:
+        if to_corners.min() > FROM_CORNER and to_others.min() > APART and to_others[0] > FROM_GRASP:
             chosen.append(weights)
         if len(chosen) > SHOWN:
             break

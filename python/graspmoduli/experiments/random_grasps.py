@@ -227,7 +227,7 @@ def fig6(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
 
 
 def _neighbourhood(good: Floats, around: Floats, title: str) -> Figure:
-    figure = Figure(figsize=(9.0, 4.8), dpi=110)
+    figure = Figure(figsize=(9.0, 4.3), dpi=110)
     figure.suptitle(title, fontsize=11, y=0.985)
     camera = Camera(0.7, 0.35)
     contacts, normals, centers = split(around)
@@ -254,6 +254,7 @@ def _neighbourhood(good: Floats, around: Floats, title: str) -> Figure:
     for axes, text in ((left, "contacts, normals and centre of mass (grey)"), (right, "normals")):
         axes.set_aspect("equal")
         axes.axis("off")
+        axes.set_anchor("N")
         axes.set_title(text, fontsize=10)
     return figure
 
