@@ -260,15 +260,16 @@ class TestDeformations:
             assert 0.95 * 0.3 < float(d.removeprefix("d = ")) <= 0.3
             assert q.startswith("Q = ")
 
-    @pytest.mark.parametrize("friction", [0.1, 1.0, 3.0])
+    @pytest.mark.parametrize("friction", [0.4, 1.0, 3.0])
     def test_round_cones_are_lipschitz_with_the_constant_that_is_given(self, friction):
         generator = np.random.default_rng(3)
-        rows = rows_of(11, 0, 4000)
+        rows = rows_of(11, 0, 20_000)
         contacts, normals, centers = split(rows)
         good = gm.quality(contacts, normals, centers, friction=friction) > 0.01
         steepest = 0.0
         for size in (1e-6, 1e-3, 0.1, 1.0):
-            c, n, z = contacts[good][:60], normals[good][:60], centers[good][:60]
+            c, n, z = contacts[good][:30], normals[good][:30], centers[good][:30]
+            assert len(c) == 30
             moved = n + size * generator.normal(size=n.shape)
             moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
             pair = [
