@@ -98,7 +98,8 @@ def test_fits_and_their_grasps_are_copied(fit):
 
 
 def test_different_objects_differ(objects):
-    assert gm.PlacedGrasp(CIRCLE, -CIRCLE, ORIGIN) != gm.PlacedGrasp(CIRCLE, -CIRCLE, [0, 0, 1])
+    above = np.array([0.0, 0.0, 1.0])
+    assert gm.PlacedGrasp(CIRCLE, -CIRCLE, ORIGIN) != gm.PlacedGrasp(CIRCLE, -CIRCLE, above)
     assert gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN) != gm.WrenchSpace(
         CIRCLE, -CIRCLE, ORIGIN, edges=9
     )

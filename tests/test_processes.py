@@ -313,3 +313,43 @@ def test_forked_children_compute_the_same_in_parallel():
     finally:
         child.kill()
         child.join()
+
+
+INTERRUPTED = """
+import os, signal, sys, threading
+import numpy as np
+import graspmoduli as gm
+
+points = np.random.default_rng(0).normal(size=(400_000, 4, 3))
+normals = points / np.linalg.norm(points, axis=-1, keepdims=True)
+e, f = (gm.shapes.MODELS[name] for name in "ef")
+grasp = gm.Grasp([0.5, 0.5, 0.5], [0, 2, 4])
+calls = {
+    "batch": lambda: gm.quality(points, -normals, np.zeros(3)),
+    "gradient": lambda: gm.quality_gradient(points, -normals, np.zeros(3)),
+    "best": lambda: gm.smallest_quality(points, -normals, np.zeros(3), edges=200),
+    "sampling": lambda: gm.sample_points(f, 3_000_000),
+    "synthesis": lambda: [gm.synthesize(f, top=50, seed=seed) for seed in range(1000)],
+    "transfer": lambda: gm.transfer(e, grasp, f, "gradient", surfaces=5000, steps=500),
+    "ascent": lambda: gm.transfer(e, [grasp] * 5000, f, "ascent"),
+    "distance": lambda: [gm.surface_distance(e, f, tolerance=1e-9) for _ in range(10_000)],
+}
+threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    calls[sys.argv[1]]()
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    ["batch", "gradient", "best", "sampling", "synthesis", "transfer", "ascent", "distance"],
+)
+def test_ctrl_c_ends_calls_of_the_core(call):
+    start = time.monotonic()
+    command = [sys.executable, "-c", INTERRUPTED, call]
+    result = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    assert result.stdout == "interrupted\n", result.stderr
+    # They would run for many times as long, on any machine.
+    assert time.monotonic() - start < 30.0

@@ -470,10 +470,12 @@ class TestWrongInput:
 def test_soft_fingers_can_what_hard_ones_cannot():
     # Four coincident ones without friction, three collinear ones; three without friction cannot.
     tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]) / np.sqrt(3)
-    options = {"friction": 0.0, "torsion": 1.0}
-    assert gm.quality(np.zeros((4, 3)), tetrahedron, ORIGIN, **options) > 0.3
-    for m in (1, 2, 3):
-        assert gm.quality(np.zeros((m, 3)), tetrahedron[:m], ORIGIN, **options) == 0.0
+
+    def value(m: int) -> float:
+        return gm.quality(np.zeros((m, 3)), tetrahedron[:m], ORIGIN, friction=0.0, torsion=1.0)
+
+    assert value(4) > 0.3
+    assert [value(m) for m in (1, 2, 3)] == [0.0, 0.0, 0.0]
     line = np.array([[1.0, 0, 0], [-1, 0, 0], [0.5, 0, 0]])
     normals = np.array([[-1.0, 0, 0], [1, 0, 0], [-1, 0, 0]])
     assert gm.quality(line, normals, ORIGIN) == 0.0

@@ -55,4 +55,4 @@ def test_wrong_input():
         gm.sample_points(gm.shapes.MODELS["a"], 5, seed=-1)
     for wrong in (None, "a", gm.shapes.MODELS):
         with pytest.raises(gm.GraspModuliError, match="surface must be a Surface, got"):
-            gm.sample_points(wrong, 5)
+            gm.sample_points(wrong, 5)  # pyright: ignore[reportArgumentType]

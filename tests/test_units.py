@@ -56,7 +56,9 @@ class TestUnits:
         options = {"length_scale": 0.3}
         q = gm.quality(*stable, **options)
         bar = float(np.median(q))
-        np.testing.assert_array_equal(gm.quality_at_least(*stable, bar, **options), q >= bar)
+        np.testing.assert_array_equal(
+            gm.quality_at_least(*stable, threshold=bar, **options), q >= bar
+        )
         assert gm.largest_quality(*stable, **options) == gm.Extreme((int(q.argmax()),), q.max())
         assert gm.smallest_quality(*stable, **options) == gm.Extreme((int(q.argmin()),), q.min())
         bounds = gm.circular_quality(*stable, **options)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, count, floats, locked, number
+from ._arrays import Floats, brief, count, floats, locked, number
 from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp
 from .surfaces import Surface, _what, a_surface, combine, some_surfaces
@@ -180,6 +180,9 @@ def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     )
 
 
+_D = TypeVar("_D", bound="Distance")
+
+
 class Distance(float):
     """A distance with a proven error bound: the true one is at most ``error`` larger.
 
@@ -189,10 +192,10 @@ class Distance(float):
     __slots__ = ("error",)
     error: float
 
-    def __new__(cls, value: float, error: float) -> Distance:
+    def __new__(cls: type[_D], value: float, error: float) -> _D:
         """As :func:`distance` makes it."""
-        self = super().__new__(cls, value)
-        object.__setattr__(self, "error", float(error))
+        self = float.__new__(cls, number("value", value))
+        object.__setattr__(self, "error", number("error", error))
         return self
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -201,10 +204,10 @@ class Distance(float):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (float(self), self.error)
 
-    def __copy__(self) -> Distance:
+    def __copy__(self: _D) -> _D:
         return self
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Distance:
+    def __deepcopy__(self: _D, memo: dict[int, Any]) -> _D:
         return self
 
 
@@ -222,8 +225,8 @@ class SurfaceDistance(Distance):
     def __new__(cls, value: float, error: float, u: float, theta: float) -> SurfaceDistance:
         """As :func:`surface_distance` makes it."""
         self = super().__new__(cls, value, error)
-        object.__setattr__(self, "u", float(u))
-        object.__setattr__(self, "theta", float(theta))
+        object.__setattr__(self, "u", number("u", u))
+        object.__setattr__(self, "theta", number("theta", theta))
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -260,7 +263,7 @@ def distance(start: Point, end: Point, *, angles: str = "chord") -> Distance:
     paper, or by their ``"arc"``.
     """
     if not isinstance(angles, str) or angles not in ANGLES:
-        raise GraspModuliError(f'angles must be "chord" or "arc", got {angles!r}')
+        raise GraspModuliError(f'angles must be "chord" or "arc", got {brief(angles)}')
     (first, g), (last, h) = a_point("start", start), a_point("end", end)
     arc = np.abs(shortest_turn(g, h))
     apart = arc if angles == "arc" else 2.0 * np.sin(0.5 * arc)

@@ -113,9 +113,12 @@ def quality(
 
     Notes
     -----
-    Three hard contacts with ``norm="sum"`` have a closed form. All else goes by an expanding
-    polytope, 36 to 1,300 times slower, that takes a hull for 0 if it surrounds the origin by less
-    than 1e-9 of the lever arms.
+    Three hard contacts with ``norm="sum"`` and up to 36 edges have a closed form, which answers
+    where no sign hangs on rounding. All else goes by an expanding polytope, several times slower
+    for four contacts and a hundred times for eight. "Not in its interior" means for both: in units
+    of forces and of torques about the contacts' centroid over the longest distance from it, the
+    hull reaches no farther than 1e-12 beyond some plane through the origin. The order of the
+    contacts does not change a bit of Q.
 
     Examples
     --------
@@ -304,8 +307,8 @@ def circular_quality(
     """The quality with exact, circular friction cones instead of polygonal ones, of hard fingers.
 
     Arguments and errors are those of :func:`quality`. The hull has no finite set of corners, so
-    the answer is a lower and an upper bound, see ``value`` of the result. Both are proven, up to
-    1e-9 of the lever arms: a hull that surrounds the origin by less counts as flat, and both are 0.
+    the answer is a lower and an upper bound, see ``value`` of the result. Both are proven but for
+    rounding; where the origin is not in the interior, as :func:`quality` defines it, both are 0.
     Unlike Q_l they do not depend on the coordinates' axes. The torsion of a soft grasp is left out.
 
     Parameters

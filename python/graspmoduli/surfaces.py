@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, coordinates, count, floats, locked, number
+from ._arrays import Floats, brief, coordinates, count, floats, locked, number
 from ._core import GraspModuliError
 from ._files import replacing
 
@@ -224,7 +224,9 @@ class Surface:
     # Points -------------------------------------------------------------------------------
 
     @overload
-    def radius(self, u: float, theta: float) -> float: ...
+    def radius(  # pyright: ignore[reportOverlappingOverload]: numbers are arrays, too
+        self, u: float, theta: float
+    ) -> float: ...
     @overload
     def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats: ...
     def radius(self, u: ArrayLike, theta: ArrayLike) -> Floats | float:
@@ -431,7 +433,7 @@ class Surface:
             raise
         except (OSError, TypeError, ValueError) as error:
             raise GraspModuliError(
-                f"path must be a file that can be written, got {path!r} ({error})"
+                f"path must be a file that can be written, got {brief(path)} ({brief(str(error))})"
             ) from None
 
     @classmethod
@@ -441,10 +443,13 @@ class Surface:
             with np.load(path) as data:
                 parts = data["coefficients"], float(data["bottom"]), float(data["top"])
         except FileNotFoundError:
-            raise GraspModuliError(f"path must be a surface's file, got no file {path}") from None
+            raise GraspModuliError(
+                f"path must be a surface's file, got no file {brief(path)}"
+            ) from None
         except Exception as error:
             raise GraspModuliError(
-                f"path must be a file written by Surface.save, got {path} ({error})"
+                "path must be a file written by Surface.save, "
+                f"got {brief(path)} ({brief(str(error))})"
             ) from None
         return cls.from_coefficients(*parts)
 

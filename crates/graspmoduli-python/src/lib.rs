@@ -17,10 +17,11 @@ use graspmoduli::{sampling, surface};
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };
-use pool::detached;
+use pool::{detached, interruptible};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
 
 pyo3::create_exception!(
     graspmoduli,
@@ -184,7 +185,22 @@ fn sample_points<'py>(
     square: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let square = square.as_slice()?.as_chunks().0;
-    let points = detached(py, || sampling::by_area(&surface.0, square));
+    /// Points between two looks at the signals.
+    const PIECE: usize = 1 << 14;
+    if square.len() <= PIECE {
+        let points = detached(py, || sampling::by_area(&surface.0, square));
+        return table(py, points);
+    }
+    let points = interruptible(py, |stop| {
+        let mut points = Vec::with_capacity(square.len());
+        for piece in square.chunks(PIECE) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            points.extend(sampling::by_area(&surface.0, piece));
+        }
+        Ok(points)
+    })?;
     table(py, points)
 }
 
@@ -256,7 +272,7 @@ fn synthesize<'py>(
     let cone = cone.build()?;
     let square = square.as_slice()?.as_chunks().0;
     let cells = cells(allowed.as_ref())?;
-    let found = detached(py, || {
+    let found = interruptible(py, |stop| {
         synthesis::synthesize(
             &surface.0,
             center_of_mass.into(),
@@ -265,9 +281,10 @@ fn synthesize<'py>(
             top,
             starts,
             square,
+            stop,
         )
-    });
-    let rows = found.map_err(raise)?.into_iter().map(|grasp| {
+    })?;
+    let rows = found.into_iter().map(|grasp| {
         let [[u1, t1], [u2, t2], [u3, t3]] = grasp.coordinates;
         [u1, t1, u2, t2, u3, t3, grasp.quality]
     });
@@ -329,7 +346,7 @@ impl PyDeformation {
     ) -> PyResult<Vec<Transferred<'py>>> {
         let cone = cone.build()?;
         let grasps = coordinates(&grasps)?;
-        let carried = detached(py, || self.0.naive(&grasps, &cone, samples));
+        let carried = interruptible(py, |stop| self.0.naive(&grasps, &cone, samples, stop))?;
         transferred(py, carried)
     }
 
@@ -353,7 +370,9 @@ impl PyDeformation {
             length,
             difference,
         };
-        let carried = detached(py, || self.0.by_gradient(&grasps, &cone, schedule));
+        let carried = interruptible(py, |stop| {
+            self.0.by_gradient(&grasps, &cone, schedule, stop)
+        })?;
         transferred(py, carried)
     }
 
@@ -372,9 +391,10 @@ impl PyDeformation {
             .map(|grasp| [grasp[0], grasp[1], grasp[2]])
             .collect();
         let cells = cells(allowed.as_ref())?;
-        let carried = detached(py, || {
-            self.0.by_ascent(&grasps, &cone, region(cells.as_ref()))
-        });
+        let carried = interruptible(py, |stop| {
+            let region = region(cells.as_ref());
+            self.0.by_ascent(&grasps, &cone, region, stop)
+        })?;
         transferred(py, carried)
     }
 }

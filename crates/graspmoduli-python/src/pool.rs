@@ -4,9 +4,15 @@
 //! Python 3.14) has none of its parent's: it would wait for them for ever. So a child computes on a
 //! pool of its own. The process that loaded this module uses rayon's, and pays nothing.
 
+use crate::raise;
+use graspmoduli::error::Error;
 use pyo3::prelude::*;
+use std::panic::resume_unwind;
 use std::process::id;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
 /// The process that loaded this module.
 static HOME: OnceLock<u32> = OnceLock::new();
@@ -25,18 +31,56 @@ pub fn remember_process() {
     HOME.get_or_init(id);
 }
 
+/// Between two looks at the signals that came.
+const TICK: Duration = Duration::from_millis(50);
+
 /// Releases the interpreter and computes; parallel work may be part of it.
 pub fn detached<R: Send>(py: Python<'_>, task: impl FnOnce() -> R + Send) -> R {
-    py.detach(|| {
-        if HOME.get() == Some(&id()) {
-            return task();
-        }
-        let mut pool = CHILD.get_or_init(Pool::new);
-        while pool.process != id() {
-            pool = pool.next.get_or_init(|| Box::new(Pool::new()));
-        }
-        pool.threads.install(task)
-    })
+    py.detach(|| pooled(task))
+}
+
+/// The same for work of seconds and more, on a thread of its own, while this one waits for
+/// signals: Ctrl-C sets the flag, which the work looks at, and is raised when it has ended.
+pub fn interruptible<R: Send>(
+    py: Python<'_>,
+    task: impl FnOnce(&AtomicBool) -> Result<R, Error> + Send,
+) -> PyResult<R> {
+    let stop = AtomicBool::new(false);
+    let mut signal = None;
+    let result = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (working, over) = channel::<()>();
+            let stop = &stop;
+            let work = scope.spawn(move || {
+                // Dropped at the end, also by a panic.
+                let _working = working;
+                pooled(|| task(stop))
+            });
+            while over.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
+                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                    stop.store(true, Ordering::Relaxed);
+                    signal = Some(raised);
+                }
+            }
+            work.join().unwrap_or_else(|panic| resume_unwind(panic))
+        })
+    });
+    match signal {
+        Some(raised) => Err(raised),
+        None => result.map_err(raise),
+    }
+}
+
+/// Computes where this process has threads.
+fn pooled<R: Send>(task: impl FnOnce() -> R + Send) -> R {
+    if HOME.get() == Some(&id()) {
+        return task();
+    }
+    let mut pool = CHILD.get_or_init(Pool::new);
+    while pool.process != id() {
+        pool = pool.next.get_or_init(|| Box::new(Pool::new()));
+    }
+    pool.threads.install(task)
 }
 
 impl Pool {

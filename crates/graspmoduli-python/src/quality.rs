@@ -1,8 +1,9 @@
 //! Grasp quality: `graspmoduli/quality.py` and `wrench_space.py`.
 
-use crate::pool::detached;
+use crate::pool::{detached, interruptible};
 use crate::{Cone, raise, table, vectors};
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
+use graspmoduli::error::Error;
 use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -32,8 +33,34 @@ impl Grasps<'_> {
                 Some(each) => each.as_slice()?,
                 None => &[],
             },
+            stop: None,
         })
     }
+}
+
+/// Batches of so many grasps, three contacts each, take less time than to start a thread is worth.
+const SHORT: usize = 2000;
+
+/// Work on a batch, interruptible if it is long.
+fn computed<R: Send>(
+    py: Python<'_>,
+    batch: Batch<'_>,
+    work: impl FnOnce(Batch<'_>) -> Result<R, Error> + Send,
+) -> PyResult<R> {
+    let many = if batch.points.len() == 3 * batch.centers.len() {
+        SHORT
+    } else {
+        SHORT / 50
+    };
+    if batch.centers.len() <= many {
+        return detached(py, || work(batch)).map_err(raise);
+    }
+    interruptible(py, |stop| {
+        work(Batch {
+            stop: Some(stop),
+            ..batch
+        })
+    })
 }
 
 fn norm(each: bool) -> Norm {
@@ -214,7 +241,9 @@ pub fn quality<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![0.0; batch.centers.len()];
-    detached(py, || batch.quality(&cone, norm(each), &mut out)).map_err(raise)?;
+    computed(py, batch, |batch| {
+        batch.quality(&cone, norm(each), &mut out)
+    })?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -228,7 +257,7 @@ pub fn quality_gradient<'py>(
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let width = Gradient::width(grasps.0.as_array().shape()[1]);
     let mut out = vec![0.0; batch.centers.len() * width];
-    detached(py, || batch.gradient(&cone, &mut out)).map_err(raise)?;
+    computed(py, batch, |batch| batch.gradient(&cone, &mut out))?;
     PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
 }
 
@@ -242,7 +271,9 @@ pub fn quality_at_least<'py>(
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![false; batch.centers.len()];
-    detached(py, || batch.is_at_least(&cone, threshold, &mut out)).map_err(raise)?;
+    computed(py, batch, |batch| {
+        batch.is_at_least(&cone, threshold, &mut out)
+    })?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -255,14 +286,13 @@ pub fn extreme_quality(
     largest: bool,
 ) -> PyResult<Option<(usize, f64)>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
-    detached(py, || {
+    computed(py, batch, |batch| {
         if largest {
             batch.largest(&cone)
         } else {
             batch.smallest(&cone)
         }
     })
-    .map_err(raise)
 }
 
 /// Bounds of the quality with circular cones of n grasps.
@@ -275,7 +305,9 @@ pub fn circular_quality<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![[0.0; 2]; batch.centers.len()];
-    detached(py, || batch.circular(&cone, tolerance, &mut out)).map_err(raise)?;
+    computed(py, batch, |batch| {
+        batch.circular(&cone, tolerance, &mut out)
+    })?;
     table(py, out)
 }
 

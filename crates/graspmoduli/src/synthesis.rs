@@ -21,6 +21,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Equally spaced heights of the heuristic: 10·C(10, 2) = 450 evaluations, as the paper counts.
 const HEIGHTS: usize = 10;
@@ -65,6 +66,8 @@ pub struct Synthesized {
 /// At most `most_starts` grasps of the heuristic are followed.
 /// If the deformation from π(S) finds fewer than three grasps, the ascent also starts from the best
 /// triples of area-uniform samples; `square` holds points of the unit square to make them of.
+/// `stop`, set to true, ends the search with [`Error::Interrupted`].
+#[expect(clippy::too_many_arguments, reason = "what to look for, and where")]
 pub fn synthesize(
     surface: &Surface,
     center_of_mass: DVec3,
@@ -73,6 +76,7 @@ pub fn synthesize(
     top: usize,
     most_starts: usize,
     square: &[[f64; 2]],
+    stop: &AtomicBool,
 ) -> Result<Vec<Synthesized>, Error> {
     // Within the thread pool from the start: entering it once per stage costs as much as a stage.
     rayon::scope(|_| {
@@ -84,10 +88,12 @@ pub fn synthesize(
             top,
             most_starts,
             square,
+            stop,
         )
     })
 }
 
+#[expect(clippy::too_many_arguments, reason = "those of the public function")]
 fn within_pool(
     surface: &Surface,
     center_of_mass: DVec3,
@@ -96,6 +102,7 @@ fn within_pool(
     top: usize,
     most_starts: usize,
     square: &[[f64; 2]],
+    stop: &AtomicBool,
 ) -> Result<Vec<Synthesized>, Error> {
     if top == 0 {
         return Ok(Vec::new());
@@ -110,7 +117,11 @@ fn within_pool(
     let starts = starts(&target, cone, most_starts);
     let stages = stages(surface, center_of_mass);
     // Every start by itself, so that the result does not depend on the number of threads.
+    let stopped = || stop.load(Ordering::Relaxed);
     let approach = |evaluator: &mut Evaluator, start: &Coordinates| {
+        if stopped() {
+            return None;
+        }
         let mut at = *start;
         for (stage, center) in &stages {
             let climber = Climber {
@@ -150,7 +161,10 @@ fn within_pool(
             3,
             top.saturating_mul(8).min(triples_of(contacts.len())),
             1,
-            |_, _| ControlFlow::Continue(()),
+            |_, _| match stopped() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            },
         )?;
         let triples = triples
             .into_iter()
@@ -170,13 +184,15 @@ fn within_pool(
     // Grasps that are different so far may still climb to the same place.
     let candidates = different(&target, found, apart, top.saturating_add(top.min(3)));
     let arrived = climbed(cone, candidates, |evaluator, at| {
-        target.arrive(evaluator, at)
+        (!stopped()).then(|| target.arrive(evaluator, at)).flatten()
     });
     let mut first = different(&target, arrived, apart, usize::MAX);
     let others = first.split_off(top.min(first.len()));
     let settle = |grasps| {
         climbed(cone, grasps, |evaluator, at| {
-            target.to_maximum(evaluator, at)
+            (!stopped())
+                .then(|| target.to_maximum(evaluator, at))
+                .flatten()
         })
     };
     let mut settled = settle(first);
@@ -184,6 +200,9 @@ fn within_pool(
     if best.len() < top {
         settled.extend(settle(others));
         best = different(&target, settled, apart, top);
+    }
+    if stopped() {
+        return Err(Error::Interrupted);
     }
     let mut evaluator = Evaluator::new(cone);
     Ok(best

@@ -8,6 +8,7 @@ use crate::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Steps of Simpson's rule for the centres of mass between the two ends, as in Sec. IV.E.
 const SIMPSON: usize = 20;
@@ -69,20 +70,22 @@ impl Deformation {
     }
 
     /// The naïve transfer (Def. III.4): the coordinates stay, Q_l is sampled at `samples` + 1
-    /// values of t.
+    /// values of t. `stop`, set to true, ends this and the other methods with
+    /// [`Error::Interrupted`].
     pub fn naive(
         &self,
         grasps: &[Vec<[f64; 2]>],
         cone: &FrictionCone,
         samples: usize,
-    ) -> Vec<Carried> {
+        stop: &AtomicBool,
+    ) -> Result<Vec<Carried>, Error> {
         let still = Schedule {
             surfaces: samples,
             steps: 0,
             length: 0.0,
             difference: None,
         };
-        self.by_gradient(grasps, cone, still)
+        self.by_gradient(grasps, cone, still, stop)
     }
 
     /// The gradient method of Sec. IV.D: on each of N₁ surfaces N₂ steps x + δ∇Q(x), then the naïve
@@ -92,7 +95,8 @@ impl Deformation {
         grasps: &[Vec<[f64; 2]>],
         cone: &FrictionCone,
         schedule: Schedule,
-    ) -> Vec<Carried> {
+        stop: &AtomicBool,
+    ) -> Result<Vec<Carried>, Error> {
         let stages = self.stages(schedule.surfaces);
         let carry = |evaluator: &mut Evaluator, start: &Vec<[f64; 2]>| {
             let mut at = start.clone();
@@ -101,6 +105,7 @@ impl Deformation {
             for (index, (surface, center)) in stages.iter().enumerate() {
                 // The way ends with the naïve transfer to the target.
                 let last = index + 1 == stages.len();
+                go_on(stop)?;
                 for _ in 0..if last { 0 } else { schedule.steps } {
                     let slope = match schedule.difference {
                         Some(h) => {
@@ -121,11 +126,11 @@ impl Deformation {
                 let quality = evaluator.quality(&contacts(surface, &at), *center);
                 path.push([index as f64 / (stages.len() - 1) as f64, quality]);
             }
-            Carried {
+            Ok(Carried {
                 coordinates: at,
                 path,
                 evaluations,
-            }
+            })
         };
         grasps
             .par_iter()
@@ -144,7 +149,8 @@ impl Deformation {
         grasps: &[Coordinates],
         cone: &FrictionCone,
         region: &dyn Region,
-    ) -> Vec<Carried> {
+        stop: &AtomicBool,
+    ) -> Result<Vec<Carried>, Error> {
         let (surface, center) = self.at(1.0);
         let target = Climber {
             surface: &surface,
@@ -156,18 +162,24 @@ impl Deformation {
             .par_iter()
             .map_init(
                 || Evaluator::new(cone),
-                |evaluator, start| self.ascend(evaluator, *start, &target),
+                |evaluator, start| self.ascend(evaluator, *start, &target, stop),
             )
             .collect()
     }
 
     /// The best of three ways, in few long steps, in many short ones and at once, and on to a local
     /// maximum.
-    fn ascend(&self, evaluator: &mut Evaluator, start: Coordinates, target: &Climber) -> Carried {
+    fn ascend(
+        &self,
+        evaluator: &mut Evaluator,
+        start: Coordinates,
+        target: &Climber,
+        stop: &AtomicBool,
+    ) -> Result<Carried, Error> {
         let before = evaluator.evaluations();
-        let (mut at, mut path) = self.ascend_in_steps(evaluator, start, target, 0.25);
+        let (mut at, mut path) = self.ascend_in_steps(evaluator, start, target, 0.25, stop)?;
         for longest in [1.0 / 12.0, 1.0] {
-            let other = self.ascend_in_steps(evaluator, start, target, longest);
+            let other = self.ascend_in_steps(evaluator, start, target, longest, stop)?;
             if noticeably(reached(&other.1), reached(&path)) {
                 (at, path) = other;
             }
@@ -179,11 +191,11 @@ impl Deformation {
             path.pop();
             path.push([1.0, quality]);
         }
-        Carried {
+        Ok(Carried {
             coordinates: at.to_vec(),
             path,
             evaluations: evaluator.evaluations() - before,
-        }
+        })
     }
 
     /// Where a grasp comes to, and (t, Q_l) on the way.
@@ -193,7 +205,8 @@ impl Deformation {
         start: Coordinates,
         target: &Climber,
         longest: f64,
-    ) -> (Coordinates, Vec<[f64; 2]>) {
+        stop: &AtomicBool,
+    ) -> Result<(Coordinates, Vec<[f64; 2]>), Error> {
         const SHORTEST: f64 = 1.0 / 64.0;
         /// The next surface is near enough if the grasp keeps this share of its quality there.
         const KEPT: f64 = 0.5;
@@ -207,6 +220,7 @@ impl Deformation {
         let mut path = vec![[0.0, quality]];
         let (mut t, mut step) = (0.0, longest);
         while t < 1.0 {
+            go_on(stop)?;
             let next = if t + 1.01 * step >= 1.0 {
                 1.0
             } else {
@@ -246,8 +260,15 @@ impl Deformation {
             path.push([t, quality]);
             step = (1.5 * step).min(longest);
         }
-        (at, path)
+        Ok((at, path))
     }
+}
+
+fn go_on(stop: &AtomicBool) -> Result<(), Error> {
+    if stop.load(Ordering::Relaxed) {
+        return Err(Error::Interrupted);
+    }
+    Ok(())
 }
 
 /// The allowed contacts nearest to these, if there are any.
@@ -343,6 +364,7 @@ mod tests {
     fn exact_and_finite_differences_go_the_same_way() {
         let cone = FrictionCone::new(1.0, 8).unwrap();
         let way = Deformation::new(&surface(0.6, 0.05), &surface(0.8, 0.2)).unwrap();
+        let go = AtomicBool::new(false);
         let grasps = vec![vec![[0.5, 0.1], [0.45, 2.2], [0.55, 4.3]]];
         let schedule = Schedule {
             surfaces: 10,
@@ -350,7 +372,7 @@ mod tests {
             length: 1e-3,
             difference: None,
         };
-        let exact = way.by_gradient(&grasps, &cone, schedule);
+        let exact = way.by_gradient(&grasps, &cone, schedule, &go).unwrap();
         let difference = Some(1e-7);
         let finite = way.by_gradient(
             &grasps,
@@ -359,15 +381,19 @@ mod tests {
                 difference,
                 ..schedule
             },
+            &go,
         );
+        let finite = finite.unwrap();
         assert_eq!(exact[0].path.len(), 11);
         assert_eq!(exact[0].evaluations, 50 + 11);
         assert_eq!(finite[0].evaluations, 350 + 11);
         for (a, b) in exact[0].path.iter().zip(&finite[0].path) {
             assert!((a[1] - b[1]).abs() < 1e-4, "{a:?} {b:?}");
         }
-        let still = way.naive(&grasps, &cone, 10);
+        let still = way.naive(&grasps, &cone, 10, &go).unwrap();
         assert_eq!(still[0].coordinates, grasps[0]);
         assert!(exact[0].path[10][1] > still[0].path[10][1]);
+        let stopped = way.naive(&grasps, &cone, 10, &AtomicBool::new(true));
+        assert_eq!(stopped, Err(Error::Interrupted));
     }
 }

@@ -5,11 +5,13 @@
 
 use graspmoduli::ascent::{Anywhere, Cells, Coordinates, Region};
 use graspmoduli::contact::FrictionCone;
+use graspmoduli::error::Error;
 use graspmoduli::quality::Evaluator;
 use graspmoduli::surface::Surface;
 use graspmoduli::synthesis::{Synthesized, synthesize};
 use graspmoduli::transfer::{Carried, Deformation};
 use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
 
 /// What neither random steps nor a second ascent may gain, relative to Q.
 const NOTHING: f64 = 1e-5;
@@ -26,6 +28,9 @@ impl Draws {
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 }
+
+/// Nobody stops these.
+static GO: AtomicBool = AtomicBool::new(false);
 
 /// Radii (1 + bump · wave) at the knots, stretched across x by `flat`.
 fn surface(flat: f64, bump: f64, seed: u64, noise: f64) -> Surface {
@@ -60,12 +65,24 @@ fn square() -> Vec<[f64; 2]> {
 
 fn found(surface: &Surface, region: &dyn Region, top: usize, starts: usize) -> Vec<Synthesized> {
     let center = surface.integrals().center_of_mass;
-    synthesize(surface, center, &cone(), region, top, starts, &square()).unwrap()
+    synthesize(
+        surface,
+        center,
+        &cone(),
+        region,
+        top,
+        starts,
+        &square(),
+        &GO,
+    )
+    .unwrap()
 }
 
 fn carried(from: &Surface, to: &Surface, at: Coordinates, region: &dyn Region) -> Carried {
     let way = Deformation::new(from, to).unwrap();
-    way.by_ascent(&[at], &cone(), region).remove(0)
+    way.by_ascent(&[at], &cone(), region, &GO)
+        .unwrap()
+        .remove(0)
 }
 
 fn three(at: &[[f64; 2]]) -> Coordinates {
@@ -272,4 +289,26 @@ fn room_is_how_far_one_can_walk() {
             }
         }
     }
+}
+
+#[test]
+fn a_stop_is_heard() {
+    let surface = surface(0.8, 0.15, 1, 0.0);
+    let stop = AtomicBool::new(true);
+    let center = surface.integrals().center_of_mass;
+    let found = synthesize(
+        &surface,
+        center,
+        &cone(),
+        &Anywhere,
+        5,
+        16,
+        &square(),
+        &stop,
+    );
+    assert_eq!(found, Err(Error::Interrupted));
+    let way = Deformation::new(&surface, &surface).unwrap();
+    let at = [[0.5, 0.1], [0.45, 2.2], [0.55, 4.3]];
+    let carried = way.by_ascent(&[at], &cone(), &Anywhere, &stop);
+    assert_eq!(carried, Err(Error::Interrupted));
 }

@@ -392,6 +392,7 @@ fn batches_refuse_parts_that_do_not_fit() {
         normals: &normals,
         centers: &[[0.0; 3]; 2],
         frictions: &[],
+        stop: None,
     };
     assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 2]).is_err());
     let batch = Batch {
@@ -417,6 +418,7 @@ fn batches_agree_with_single_grasps() {
     let normals: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| -x)).collect();
     let many = Batch {
         frictions: &[],
+        stop: None,
         points: &points.repeat(1000),
         normals: &normals.repeat(1000),
         centers: &[[0.0; 3]].repeat(1000),

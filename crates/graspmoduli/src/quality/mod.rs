@@ -29,7 +29,7 @@ use plane::Three;
 use polytope::{Distance, Metric, Polytope};
 use rayon::prelude::*;
 use std::cmp::Ordering as CompareOrdering;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use three_contacts::Kernel;
 use wrenches::{Circular, Reference, Wrenches};
 
@@ -464,6 +464,8 @@ pub struct Batch<'a> {
     pub centers: &'a [[f64; 3]],
     /// Friction coefficients, m per grasp; if empty, those of the friction cone.
     pub frictions: &'a [f64],
+    /// Set to true it ends the work before the next grasp, with [`Error::Interrupted`].
+    pub stop: Option<&'a AtomicBool>,
 }
 
 /// Grasps per unit of parallel work: long enough to pay for its start, short enough to share.
@@ -661,6 +663,9 @@ impl Worker {
         index: usize,
         evaluate: impl FnOnce(&mut Evaluator, &[Contact], DVec3) -> T,
     ) -> Result<T, Error> {
+        if batch.stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            return Err(Error::Interrupted);
+        }
         let m = self.contacts.len();
         let own = index * m..(index + 1) * m;
         let pairs = batch.points[own.clone()]
