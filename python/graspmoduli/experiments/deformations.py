@@ -333,7 +333,8 @@ def fig9(pieces: Pieces, seconds: Seconds, scale: Scale) -> Outcome:
             Row(f"{kind} transfers that end force closure", "IV.C", paper, counts(stable, total),
                 "more than half, but not all, in every seed" if lost else
                 "more than half in every seed",
-                most and not (lost and bool((stable == total).any()))),
+                most and not (lost and bool((stable == total).any())),
+                "" if lost else "they end in the same grasp on S_j from wherever they come"),
             Row(f"{kind} transfers that are force closure all the way", "IV.C", "–",
                 counts(held, total), BEYOND, None, "the worst point between samples counts"),
         ]  # fmt: skip
