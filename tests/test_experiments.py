@@ -19,15 +19,33 @@ from scipy.stats import kstest
 import graspmoduli as gm
 import reference
 from graspmoduli import _core, cli
-from graspmoduli.experiments import EXPERIMENTS, FAMILIES, NAMES, random_grasps, reproduce, store
+from graspmoduli.experiments import (
+    EXPERIMENTS,
+    FAMILIES,
+    NAMES,
+    carrying,
+    deformations,
+    random_grasps,
+    reproduce,
+    revolution,
+    store,
+)
+from graspmoduli.experiments.common import over_seeds
+from graspmoduli.experiments.report import BEYOND
 from graspmoduli.experiments.settings import SCALES, Cone
 from graspmoduli.experiments.store import Piece, Store
-from graspmoduli.experiments.worst import proven_radius, split, worst_neighbour
+from graspmoduli.experiments.worst import (
+    proven_radius,
+    split,
+    steepest_at_the_pole,
+    worst_neighbour,
+)
 
 #: Small enough for a test.
 TINY = replace(
     SCALES["quick"], survey_pieces=6, survey_grasps=5_000, near05_pieces=4, near05_grasps=1_000,
     near20_pieces=4, near20_grasps=20_000, search_starts=20, search_rounds=2, fig9_sources="j",
+    seeds=1,
 )  # fmt: skip
 #: No chance in a fixed seed: this only says how unlikely it was chosen.
 UNLIKELY = 1e-3
@@ -175,6 +193,235 @@ class TestWorstNeighbours:
         assert proven_radius(0.05, edges=32) > 0.0
 
 
+#: Three seeds, of results that the tests make up.
+THREE = replace(TINY, seeds=3)
+
+
+def verdict(outcome, start):
+    """Whether the one row that starts so agrees."""
+    (row,) = [row for row in outcome.rows if row.what.startswith(start)]
+    return row.agrees
+
+
+@pytest.fixture(scope="module")
+def piece():
+    """Fig. 8 of one seed."""
+    return deformations.fig8_piece(0, TINY)
+
+
+class TestDeformations:
+    def test_stay_in_the_ball_that_they_name(self, piece):
+        surface = deformations._start()
+        grasp = gm.Grasp(*piece["grasp"])
+        reached = []
+        for reach in deformations.REACHES:
+            for kind in deformations.KINDS:
+                for ball in deformations.BALLS:
+                    # Every fifth: the distance of surfaces takes its time.
+                    for case in piece["moved"][deformations._key(ball, reach, kind)][::2]:
+                        target = deformations.deformed(surface, case["weights"], case["towards"])
+                        moved = gm.Grasp(*case["grasp"])
+                        apart = gm.distance((surface, grasp), (target, moved))
+                        placed = gm.place(target, moved)
+                        near = gm.placed_distance(gm.place(surface, grasp), placed)
+                        assert apart + apart.error <= case["distance"] * (1 + 1e-9)
+                        assert gm.surface_distance(surface, target) <= reach
+                        assert gm.quality(placed) == case["quality"]
+                        if ball == deformations.MODULI:
+                            assert case["distance"] <= reach
+                            reached.append(case["distance"] / reach)
+                        else:
+                            assert near <= reach
+                        if kind == "grasp only":
+                            assert case["towards"] == 0.0
+                        if kind == "surface only":
+                            assert moved == grasp
+        # To its rim, nearly, but where a surface of the simplex is nearer.
+        assert np.mean(np.array(reached) > 0.95) > 0.6
+
+    def test_the_verdict_can_fail_in_one_case_of_one_seed(self, piece):
+        good = json.loads(json.dumps(piece))
+        for cases in good["moved"].values():
+            for case in cases:
+                case["quality"] = 0.2
+        bad = json.loads(json.dumps(good))
+        bad["moved"][deformations._key(deformations.MODULI, 0.3, "combined")][7]["quality"] = 0.19
+        start = "smallest Q₈ of 10 deformations of each kind with d((g, S), (g′, S′)) ≤ 0.3"
+        assert verdict(deformations.fig8({"fig8": [good] * 3}, {}, THREE), start) is True
+        assert verdict(deformations.fig8({"fig8": [good, bad, good]}, {}, THREE), start) is False
+
+    def test_pictures_tell_their_distance(self, piece):
+        figure = deformations._fig8_picture(piece)
+        titles = [axes.get_title() for axes in figure.axes]
+        assert titles[0].startswith("the grasp\nd = 0\nQ = ")
+        for title, kind in zip(titles[1:], deformations.KINDS, strict=True):
+            name, d, q = title.split("\n")
+            assert name == kind
+            assert 0.95 * 0.3 < float(d.removeprefix("d = ")) <= 0.3
+            assert q.startswith("Q = ")
+
+    @pytest.mark.parametrize("friction", [0.4, 1.0, 3.0])
+    def test_round_cones_are_lipschitz_with_the_constant_that_is_given(self, friction):
+        generator = np.random.default_rng(3)
+        rows = rows_of(11, 0, 20_000)
+        contacts, normals, centers = split(rows)
+        good = gm.quality(contacts, normals, centers, friction=friction) > 0.01
+        steepest = 0.0
+        for size in (1e-6, 1e-3, 0.1, 1.0):
+            c, n, z = contacts[good][:30], normals[good][:30], centers[good][:30]
+            assert len(c) == 30
+            moved = n + size * generator.normal(size=n.shape)
+            moved /= np.linalg.norm(moved, axis=-1, keepdims=True)
+            pair = [
+                gm.PlacedGrasp(*part)
+                for parts in ((c, n, z), (c + size * generator.normal(size=c.shape), moved,
+                                          z + size * generator.normal(size=z.shape)))
+                for part in zip(*parts, strict=True)
+            ]  # fmt: skip
+            bounds = gm.circular_quality(pair, friction=friction, tolerance=1e-5)
+            for k in range(len(c)):
+                p, q = pair[k], pair[k + len(c)]
+                lever = np.linalg.norm(p.contacts - p.center_of_mass, axis=1).max()
+                low = max(bounds.lower[k] - bounds.upper[k + len(c)],
+                          bounds.lower[k + len(c)] - bounds.upper[k])  # fmt: skip
+                slope = low / gm.placed_distance(p, q)
+                assert slope <= deformations.lipschitz_constant(friction, lever)
+                steepest = max(steepest, slope)
+        # The constant is not far from what happens.
+        assert steepest > 0.05 * deformations.lipschitz_constant(friction, 2.0)
+
+    def test_polygons_are_not_lipschitz_at_the_pole(self, good):
+        drop, grasp, near = steepest_at_the_pole(good[0.2])
+        p, q = (gm.PlacedGrasp(*(part[0] for part in split(row[None]))) for row in (grasp, near))
+        assert gm.placed_distance(p, q) < 2e-9
+        assert gm.quality(p) - gm.quality(q) == pytest.approx(drop, abs=1e-15)
+        assert drop > 0.01
+
+    def test_verdicts_on_transfers_can_fail(self):
+        def pieces(naive, interpolation, slope=1.0):
+            paths = {
+                f"{kind} j{target}": {
+                    "quality": [0.3, 0.3 if k < held else 0.0],
+                    "worst": [0.0, 0.0],
+                    "slope": 1.0,
+                    "round slope": slope,
+                    "round constant": 2.0,
+                }
+                for kind, held in (("naive", naive), ("interpolation", interpolation))
+                for k, target in enumerate("abcdefghikl")
+            }
+            return paths
+
+        def outcome(*runs, drop=0.0):
+            found = {"fig9": list(runs), "poles": [{"drop": drop, "distance": 1e-9}]}
+            return deformations.fig9(found, {}, THREE)
+
+        fine = pieces(10, 6)
+        for runs, kind, wanted in (
+            ((fine, fine, fine), "naive", True),
+            ((fine, pieces(11, 6), fine), "naive", False),
+            ((fine, fine, pieces(5, 6)), "naive", False),
+            ((fine, fine, fine), "interpolation", True),
+            ((fine, pieces(10, 5), fine), "interpolation", False),
+        ):
+            assert verdict(outcome(*runs), f"{kind} transfers that end") is wanted
+        assert verdict(outcome(fine, fine, fine), "Q with round cones") is True
+        steep = pieces(10, 6, slope=2.1)
+        assert verdict(outcome(steep, fine, fine), "Q with round cones") is False
+        assert verdict(outcome(fine, fine, fine), "Q₈, whose cones") is True
+        assert verdict(outcome(fine, fine, fine, drop=0.02), "Q₈, whose cones") is False
+
+
+class TestTransfers:
+    def test_verdicts_are_about_every_seed(self):
+        def piece(naive, gradient):
+            return {
+                method: {"quality": values, "evaluations": 7, "seconds": 0.0}
+                for method, values in zip(
+                    carrying.METHODS, (naive, gradient, gradient, gradient), strict=True
+                )
+            }
+
+        fine = [piece([0.1] * 11 + [0.0], [0.2] * 12)] * 36
+        lost = [*fine[:-1], piece([0.1] * 12, [0.2] * 11 + [0.0])]
+        start = "transfers by the paper's gradient method, h = 1e-5 that end"
+        assert verdict(carrying.fig10({"fig10": fine}, {}, THREE), start) is True
+        outcome = carrying.fig10({"fig10": lost}, {}, THREE)
+        assert verdict(outcome, start) is False
+        (row,) = [row for row in outcome.rows if row.what.startswith(start)]
+        assert row.ours == "143 to 144 of 144, in the mean 143.7"
+
+    def test_the_papers_method_takes_finite_differences(self):
+        source, grasp = gm.shapes.MODELS["a"], gm.Grasp([0.2, 0.5, 0.8], [0.1, 2.2, 4.1])
+        counts = []
+        for name in (carrying.PAPERS, carrying.EXACT):
+            method, difference = carrying.METHODS[name]
+            end = gm.transfer(source, grasp, gm.shapes.MODELS["b"], method, difference=difference)
+            counts.append(end.evaluations)
+        assert counts[0] > 6 * counts[1]
+
+
+class TestRevolution:
+    @pytest.mark.parametrize(
+        ("theta", "degrees"),
+        [
+            ([0, 180, 180], 0),
+            ([10, 190, 10], 0),
+            ([0, 120, 240], 60),
+            ([350, 10, 180], 10),
+            ([0, 90, 180], 45),
+            ([5, 175, 0], 5),
+        ],
+    )
+    def test_how_far_from_a_plane_with_the_axis(self, theta, degrees):
+        for turn in (0.0, 1.0, 200.0):
+            grasp = gm.Grasp([0.5] * 3, np.radians(theta) + turn)
+            assert np.degrees(revolution.off_plane(grasp)) == pytest.approx(degrees, abs=1e-9)
+
+    def test_best_grasps_of_a_and_b_are_in_a_plane_and_those_of_c_and_d_are_not(self):
+        off = [np.degrees(revolution.axis_piece(k, TINY)["off"]) for k in range(4)]
+        assert max(off[:2]) < 20.0
+        assert min(off[2:]) > 40.0
+
+    def test_seeds_are_repetitions_with_another_seed(self):
+        for k in range(4):
+            again = revolution.axis_piece(k, replace(TINY, seed=1))
+            assert revolution.axis_piece(4 + k, THREE) == again
+        assert revolution.axis_piece(0, THREE) != revolution.axis_piece(4, THREE)
+
+    def test_heights_have_as_many_triples_as_they_say(self):
+        for heights, triples in revolution.TRIPLES.items():
+            assert heights * (heights * (heights - 1) // 2) == triples
+
+    def test_deformation_starts_from_every_angle(self):
+        # On the elliptic model, the angle matters.
+        found = revolution.fig12_piece(revolution.UNEVEN.index("f"), TINY)["deformation"]
+        assert len(found) == 24
+        assert max(found) > 1.5 * np.mean(found)
+        assert found[0] > 1.5 * np.mean(found)
+
+    def test_the_verdict_on_deformation_is_about_the_mean_over_angles(self):
+        def outcome(angles, brute):
+            seconds = {"brute": 0.0, "ours": 0.0, "deformation": 0.0, "all angles": 0.0}
+            found = {
+                "fig12": [{"deformation": angles, "evaluations": 1, "seconds": seconds}] * 8,
+                "search12": [
+                    {"brute": brute[k // 8], "ours": 0.3, "seconds": seconds} for k in range(24)
+                ],
+            }
+            return revolution.fig12(found, {}, THREE)
+
+        start = "mean Q₈ of deformation"
+        # One angle of 24 above exhaustive search changes nothing.
+        assert verdict(outcome([0.4] + [0.2] * 23, [0.25, 0.26, 0.27]), start) is True
+        assert verdict(outcome([0.2] + [0.4] * 23, [0.25, 0.26, 0.27]), start) is False
+        assert verdict(outcome([0.2] * 24, [0.25, 0.19, 0.27]), start) is False
+
+    def test_numbers_over_seeds(self):
+        assert over_seeds([0.1, 0.2, 0.3]) == "0.2000 ± 0.0577, from 0.1000 to 0.3000"
+        assert over_seeds([0.25]) == "0.2500"
+
+
 class TestReproduce:
     @pytest.mark.long
     def test_every_figure_has_its_rows_and_pictures_and_the_table_all_numbers(self, tiny, tmp_path):
@@ -195,6 +442,11 @@ class TestReproduce:
         assert page.count("<img") == page.count("data:image/png;base64,")
         assert 'src="data:' in page
         markdown = (tmp_path / "report.md").read_text()
+        assert "twelve surfaces are not public" in markdown
+        assert "splines with positive coefficients" in markdown
+        assert all(
+            outcome.captions.keys() == outcome.pictures.keys() for outcome in outcomes.values()
+        )
         for row in results["experiments"]["fig5"]["rows"]:
             assert row["what"] in markdown
         totals = {name: FAMILIES[name].pieces(TINY) for name in ("fig8", "fig10")}
@@ -205,6 +457,11 @@ class TestReproduce:
         outcomes = reproduce(["table"], out=tmp_path)
         assert list(outcomes) == ["fig5", "fig7", "fig8", "fig9", "fig10", "fig11", "fig12"]
         assert all(outcome.rows for outcome in outcomes.values())
+        for outcome in outcomes.values():
+            for row in outcome.rows:
+                # Each row says what agreement means, or that there is nothing to compare.
+                assert row.criterion
+                assert row.criterion != BEYOND or row.agrees is None
         assert not list(tmp_path.glob("*.png"))
 
     @pytest.mark.long
@@ -371,7 +628,7 @@ class TestCommand:
         assert "models e–l" in result.stdout
         assert (tmp_path / "report.html").exists()
         again = self.run("fig12", "fig2", "--out", str(tmp_path))
-        assert "fig12: going on, 8 of 8 pieces are there" in again.stderr
+        assert "fig12: going on, 24 of 24 pieces are there" in again.stderr
 
     @pytest.mark.parametrize(
         ("arguments", "sentence"),

@@ -116,6 +116,23 @@ def test_a_simplex_has_corners_and_samples():
             plotting.plot_simplex(corners, weights=wrong)
     with pytest.raises(gm.GraspModuliError, match="must be three each"):
         plotting.plot_simplex(corners[:2])
+    held = plotting.plot_simplex(corners, weights=[[0.3, 0.3, 0.4]], grasps=[GRASP])
+    assert "contact behind" in [text.get_text() for text in held.legends[0].get_texts()]
+    with pytest.raises(gm.GraspModuliError, match="one or None for each of 1 weights, got 2"):
+        plotting.plot_simplex(corners, weights=[[0.3, 0.3, 0.4]], grasps=[GRASP, None])
+
+
+def test_rows_have_one_scale_and_say_what_dots_are():
+    points = [(SURFACES[name], GRASP) for name in "abcd"]
+    figure = plotting.plot_rows(points, list("abcd"), columns=3)
+    assert len(figure.axes) == 4
+    assert len({axes.get_position().y0 for axes in figure.axes}) == 2
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}) == 1
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} == {
+        "contact in front",
+        "contact behind",
+    }
 
 
 def test_quality_along_paths_marks_the_lowest_point():

@@ -48,6 +48,8 @@ LINES = (
     ("#56B4E9", (0, (5, 1, 1, 1, 1, 1))),
     ("#000000", (0, (6, 3))),
 )
+#: Of the window of a surface with a grasp on it, in :func:`plot_simplex`.
+HELD = 0.19
 #: Elevation of the eye above the horizon [rad].
 ELEVATION = 0.32
 
@@ -103,6 +105,10 @@ def plot_grasps(
         Line2D([], [], marker="o", linestyle="", color=color, label=f"finger {i + 1}")
         for i, color in enumerate(FINGERS[:3])
     ]
+    handles.append(
+        Line2D([], [], marker="o", linestyle="", markeredgecolor="0.3", color="white",
+               label="contact behind")
+    )  # fmt: skip
     handles.append(Line2D([], [], color=NET, linewidth=1.0, label="fitted surface"))
     if thing.faces is None:
         handles.append(Line2D([], [], marker="s", linestyle="", color=SEEN, label="points seen"))
@@ -135,6 +141,7 @@ def plot_surface(
     if grasp is not None:
         value = quality(place(surface, grasp), friction=friction, edges=edges)
         title = f"{title}    $Q_{{{edges}}}$ = {value:.4f}    (μ = {friction:g})".strip()
+        _dots(figure)
     figure.suptitle(title, fontsize=13, y=0.97)
     return figure
 
@@ -168,17 +175,49 @@ def plot_row(
     title: str = "",
 ) -> Figure:
     """Surfaces and grasps side by side, at one scale and from one side, with their Q_l."""
-    n = len(points)
-    figure = Figure(figsize=(max(2.0 * n, 4.0), 3.2), dpi=150, facecolor="white")
+    return plot_rows(points, labels, friction=friction, edges=edges, title=title, turn=False)
+
+
+def plot_rows(
+    points: Sequence[Point],
+    labels: Sequence[str],
+    *,
+    columns: int | None = None,
+    friction: float = 1.0,
+    edges: int = 8,
+    title: str = "",
+    turn: bool = True,
+) -> Figure:
+    """Surfaces and grasps in rows, at one scale, with their labels and Q_l below.
+
+    Parameters
+    ----------
+    points, labels
+        Surface and grasp of each, and what is written below it.
+    columns
+        How many in a row, all if not given.
+    turn
+        Each is seen from the side that shows its grasp; if false, all from the side of the first.
+    """
+    n = len(points) if columns is None else count("columns", columns, 1)
+    rows = -(-len(points) // n)
+    lines = 1 + max(label.count("\n") + 1 for label in labels)
+    # Inches: text below each, the legend and the title once.
+    text, picture, foot, head = 0.19 * lines + 0.1, 2.3, 0.35, 0.35 if title else 0.1
+    high = rows * (picture + text) + foot + head
+    figure = Figure(figsize=(max(2.0 * n, 4.0), high), dpi=150, facecolor="white")
     azimuth = azimuth_of(*points[0])
     bounds = []
-    for column, ((surface, grasp), label) in enumerate(zip(points, labels, strict=True)):
-        axes = figure.add_axes((column / n, 0.15, 1.0 / n, 0.72))
-        _draw_surface(axes, surface, grasp, azimuth, friction, edges, labels=False)
+    for index, ((surface, grasp), label) in enumerate(zip(points, labels, strict=True)):
+        row, column = divmod(index, n)
+        bottom = foot + (rows - 1 - row) * (picture + text) + text
+        axes = figure.add_axes((column / n, bottom / high, 1.0 / n, picture / high))
+        seen_from = azimuth_of(surface, grasp) if turn else azimuth
+        _draw_surface(axes, surface, grasp, seen_from, friction, edges, labels=False)
         value = quality(place(surface, grasp), friction=friction, edges=edges)
         # Lost is said in words and in colour.
-        text, color = (f"Q = {value:.3f}", "0.15") if value > 0.0 else ("lost", "#D55E00")
-        axes.set_title(f"{label}\n{text}", fontsize=10, color=color, y=-0.22)
+        told, color = (f"Q = {value:.3f}", "0.15") if value > 0.0 else ("lost", "#D55E00")
+        axes.set_title(f"{label}\n{told}", fontsize=10, color=color, y=0.0, va="top", pad=0.0)
         bounds.append((*axes.get_xlim(), *axes.get_ylim()))
     low_x, high_x, low_y, high_y = np.array(bounds).T
     # Room for the arrows.
@@ -187,7 +226,21 @@ def plot_row(
         axes.set_xlim(low_x.min() - edge, high_x.max() + edge)
         axes.set_ylim(low_y.min() - edge, high_y.max() + edge)
     figure.suptitle(title, fontsize=12, y=0.98)
+    _dots(figure)
     return figure
+
+
+def _dots(figure: Figure) -> None:
+    """Says what filled dots and rings are."""
+    handles = [
+        Line2D([], [], marker="o", linestyle="", markersize=5, markeredgecolor="0.3",
+               color=fill, label=label)
+        for fill, label in (("0.3", "contact in front"), ("white", "contact behind"))
+    ]  # fmt: skip
+    figure.legend(
+        handles=handles, loc="lower center", ncols=2, frameon=False, fontsize=8,
+        bbox_to_anchor=(0.5, 0.0),
+    )  # fmt: skip
 
 
 def plot_simplex(
@@ -195,6 +248,7 @@ def plot_simplex(
     labels: Sequence[str] = ("", "", ""),
     *,
     weights: ArrayLike | None = None,
+    grasps: Sequence[Grasp | None] | None = None,
     samples: int = 10,
     seed: int = 0,
     title: str = "",
@@ -202,7 +256,7 @@ def plot_simplex(
     """Conv(X) of three surfaces, with samples where they lie in the triangle (Fig. 1 of the paper).
 
     ``weights`` are barycentric coordinates, shape (n, 3); if not given, ``samples`` of them are
-    drawn uniformly.
+    drawn uniformly. ``grasps`` are drawn on the surfaces of the weights, one for each, or None.
     """
     if len(corners) != 3 or len(labels) != 3:
         raise GraspModuliError(
@@ -214,11 +268,18 @@ def plot_simplex(
         inside = floats("weights", weights)
         if inside.ndim != 2 or inside.shape[1] != 3:
             raise GraspModuliError(f"weights must have shape (n, 3), got {inside.shape}")
+    held: list[Grasp | None] = [None] * len(inside) if grasps is None else list(grasps)
+    if len(held) != len(inside):
+        raise GraspModuliError(
+            f"grasps must be one or None for each of {len(inside)} weights, got {len(held)}"
+        )
     # Those below are drawn over those above.
-    inside = inside[np.argsort(-inside[:, 2], kind="stable")]
+    order = np.argsort(-inside[:, 2], kind="stable")
+    inside = inside[order]
+    held = [None, None, None, *(held[k] for k in order)]
     figure = Figure(figsize=(8.0, 7.2), dpi=150, facecolor="white")
     axes = figure.add_axes((0.0, 0.0, 1.0, 0.95))
-    triangle = np.array([[0.14, 0.16], [0.86, 0.16], [0.5, 0.80]])
+    triangle = np.array([[0.14, 0.19], [0.86, 0.19], [0.5, 0.83]])
     axes.plot(*triangle[[0, 1, 2, 0]].T, color="0.75", linewidth=1.2, zorder=0)
     places = inside @ triangle
     axes.plot(*places.T, "o", color=NET, markersize=3, zorder=1)
@@ -228,14 +289,20 @@ def plot_simplex(
     shapes = [*corners, *(combine(corners, w) for w in inside)]
     # All at one scale: a window of the same size around each.
     reach = max(s.radius_about((0.0, 0.0, 0.5 * (s.bottom + s.top))) for s in shapes)
-    camera = Camera(0.6, ELEVATION)
     for index, (surface, (x, y)) in enumerate(zip(shapes, [*triangle, *places], strict=True)):
         corner = index < 3
-        size = 0.24 if corner else 0.115
+        grasp = held[index]
+        size = 0.24 if corner else 0.115 if grasp is None else HELD
         window = figure.add_axes((x - 0.5 * size, 0.95 * y - 0.5 * size, size, size))
         scene = Scene()
-        add_body(scene, camera, surface, "#8fb0c9" if corner else BODY, 32 if corner else 20)
-        scene.draw(window)
+        # A grasp is seen from its own side.
+        camera = Camera(0.6 if grasp is None else azimuth_of(surface, grasp), ELEVATION)
+        detail = 20 if grasp is None and not corner else 32
+        add_body(scene, camera, surface, "#8fb0c9" if corner else BODY, detail)
+        if grasp is None:
+            scene.draw(window)
+        else:
+            add_grasp(window, scene, camera, surface, grasp, friction=1.0, edges=8, labels=False)
         window.set_aspect("equal")
         middle = 0.5 * (surface.bottom + surface.top) * np.cos(ELEVATION)
         window.set_xlim(-reach, reach)
@@ -244,6 +311,8 @@ def plot_simplex(
         if corner and labels[index]:
             above = -0.15 if index < 2 else 0.135
             axes.text(x, y + above, labels[index], ha="center", va="center", fontsize=12)
+    if any(grasp is not None for grasp in held):
+        _dots(figure)
     figure.suptitle(title, fontsize=13, y=0.98)
     return figure
 

@@ -166,9 +166,13 @@ def plane_grasp(
 ) -> RankedGrasp | None:
     """The best of the triples (u₁, 0), (u₂, π), (u₃, π), u₂ < u₃: the heuristic of Sec. IV.E.
 
-    Made for surfaces of revolution, many of whose good grasps lie in a plane with the axis; on some
-    the best does not, but has its fingers evenly around. The heights are equally spaced from 0 to
-    1; ten of them give the paper's 450 triples.
+    It assumes that the grasp lies in a plane with the axis. On some surfaces of revolution the best
+    grasps do; on others, such as the models c and d, they have their fingers evenly around, and are
+    better than any that this finds. On other surfaces than those of revolution the plane θ = 0, π
+    is one of many.
+
+    The heights are equally spaced from 0 to 1. U = {0, 1/m, …, 1} of the paper has m + 1 of them:
+    with its m = 10 that is ``heights=11``, 605 triples; the 450 that it counts are those of ten.
 
     Returns
     -------

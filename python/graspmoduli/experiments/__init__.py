@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from .._arrays import cores, count
 from .._core import GraspModuliError
-from . import on_surfaces, random_grasps
+from ..shapes import MODELS
+from . import carrying, deformations, pictures, random_grasps, revolution
 from .cluster import run_on_dask
 from .engine import run_on_threads
 from .report import Outcome, Row, write
@@ -54,18 +55,23 @@ FAMILIES: dict[str, Family] = {
     "near20": Family(lambda s: s.near20_pieces, _near(0.2)),
     "worst05": Family(lambda s: random_grasps.worst_pieces(0.05), _worst(0.05)),
     "worst20": Family(lambda s: random_grasps.worst_pieces(0.2), _worst(0.2)),
-    "fig8": Family(lambda s: 1, on_surfaces.fig8_piece),
-    "fig9": Family(lambda s: len(s.fig9_sources), on_surfaces.fig9_piece),
-    "fig10": Family(lambda s: 12, on_surfaces.fig10_piece),
-    "fig11": Family(lambda s: 10, on_surfaces.fig11_piece),
-    "fig12": Family(lambda s: 8, on_surfaces.fig12_piece),
+    "poles": Family(lambda s: 1, random_grasps.poles),
+    "fig8": Family(lambda s: s.seeds, deformations.fig8_piece),
+    "fig9": Family(lambda s: s.seeds * len(s.fig9_sources), deformations.fig9_piece),
+    "fig10": Family(lambda s: s.seeds * len(MODELS), carrying.fig10_piece),
+    "axis": Family(lambda s: s.seeds * len(revolution.ROUND_MODELS), revolution.axis_piece),
+    "fig11": Family(
+        lambda s: s.seeds * revolution.ROUND // revolution.ROUND_PIECE, revolution.fig11_piece
+    ),
+    "fig12": Family(lambda s: len(revolution.UNEVEN), revolution.fig12_piece),
+    "search12": Family(lambda s: s.seeds * len(revolution.UNEVEN), revolution.search_piece),
 }
 
 EXPERIMENTS: dict[str, Experiment] = {
-    "fig1": Experiment("a simplex of shapes", (), on_surfaces.fig1),
-    "fig2": Experiment("the twelve models", (), on_surfaces.fig2),
-    "fig3": Experiment("random shapes between them", (), on_surfaces.fig3),
-    "fig4": Experiment("a curve in the Grasp Moduli Space", (), on_surfaces.fig4),
+    "fig1": Experiment("a simplex of shapes", (), pictures.fig1),
+    "fig2": Experiment("the twelve models", (), pictures.fig2),
+    "fig3": Experiment("random shapes between them", (), pictures.fig3),
+    "fig4": Experiment("a curve in the Grasp Moduli Space", (), pictures.fig4),
     "fig5": Experiment("uniform grasps in D(1)", ("survey",), random_grasps.fig5),
     "fig6": Experiment("a neighbourhood of a grasp", (), random_grasps.fig6),
     "fig7": Experiment(
@@ -73,11 +79,11 @@ EXPERIMENTS: dict[str, Experiment] = {
         ("near05", "near20", "worst05", "worst20"),
         random_grasps.fig7,
     ),
-    "fig8": Experiment("small deformations of one grasp", ("fig8",), on_surfaces.fig8),
-    "fig9": Experiment("quality along transfers", ("fig9",), on_surfaces.fig9),
-    "fig10": Experiment("144 transfers", ("fig10",), on_surfaces.fig10),
-    "fig11": Experiment("surfaces of revolution", ("fig11",), on_surfaces.fig11),
-    "fig12": Experiment("synthesis by deformation", ("fig12",), on_surfaces.fig12),
+    "fig8": Experiment("small deformations of one grasp", ("fig8",), deformations.fig8),
+    "fig9": Experiment("quality along transfers", ("fig9", "poles"), deformations.fig9),
+    "fig10": Experiment("144 transfers", ("fig10",), carrying.fig10),
+    "fig11": Experiment("surfaces of revolution", ("axis", "fig11"), revolution.fig11),
+    "fig12": Experiment("synthesis by deformation", ("fig12", "search12"), revolution.fig12),
 }
 
 #: Every number of the text in one table, without pictures.
@@ -116,7 +122,8 @@ def reproduce(
     names
         Of fig1 … fig12 and table; all if empty.
     scale
-        ``"quick"``: minutes. ``"paper"``: the paper's own sizes.
+        ``"quick"``: under a minute on two cores. ``"paper"``: the paper's own sizes, Figs. 8 to
+        12 with ten seeds.
     out
         The folder. Pieces that are there already are not computed again.
     threads

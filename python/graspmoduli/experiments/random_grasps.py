@@ -13,9 +13,9 @@ from .._arrays import Floats
 from ..drawing import FINGERS, Camera
 from ..plotting import LINES
 from ..quality import quality
-from .report import BEYOND, IN_KIND, STATISTICALLY, Outcome, Row
+from .report import BEYOND, Outcome, Row
 from .settings import Scale
-from .worst import proven_radius, split, worst_neighbour
+from .worst import proven_radius, split, steepest_at_the_pole, worst_neighbour
 
 THRESHOLDS = (0.05, 0.2)
 #: Of the histogram: Fig. 5 goes to 0.4.
@@ -31,6 +31,8 @@ SAMPLES = {0.05: 25, 0.2: 150}
 PAPER = {0.05: 0.02, 0.2: 0.1}
 #: Numbers of random streams: pieces of uniform grasps from 0, neighbourhoods from here on.
 NEIGHBOURHOODS = 1 << 32
+#: Fig. 6: neighbours that are drawn, and within what distance.
+SHOWN, SHOWN_EPSILON = 150, 0.1
 #: Halvings of the interval in which the search still finds a lost neighbour.
 HALVINGS = 7
 
@@ -95,6 +97,18 @@ def worst(delta: float, index: int, scale: Scale) -> dict[str, Any]:
     return {"refuted": lost}
 
 
+def poles(index: int, scale: Scale) -> dict[str, Any]:
+    """How much Q_l changes within next to nothing of −e₃, where R(n) is not continuous."""
+    drop, grasp, near = steepest_at_the_pole(_good(0.2, scale), scale.cone)
+    apart = np.linalg.norm(grasp[9:18] - near[9:18])
+    return {
+        "drop": drop,
+        "distance": float(apart),
+        "grasp": grasp.tolist(),
+        "neighbour": near.tolist(),
+    }
+
+
 def worst_pieces(delta: float) -> int:
     """How many pieces :func:`worst` has."""
     return 2 * (len(EPSILONS[delta]) + 1)
@@ -128,14 +142,15 @@ def fig5(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
     }
     largest = max(piece["largest"] for piece in found)
 
-    def row(what: str, number: int, paper: float, rounding: float, why: str, must: str) -> Row:
+    def row(what: str, number: int, paper: float, rounding: float, why: str) -> Row:
         p, error = share(number, count)
         agrees = abs(p - paper) <= rounding + 4.0 * error
         digits = 4 if paper < 0.01 else 3
         return Row(
             what, "IV.A", f"{100 * paper:.3g} %",
             f"({100 * p:.{digits}f} ± {100 * error:.{digits}f}) %",
-            must, bool(agrees), why,
+            f"within the paper's rounding, {100 * rounding:g} %, and four standard errors",
+            bool(agrees), why,
         )  # fmt: skip
 
     outcome = Outcome()
@@ -144,19 +159,19 @@ def fig5(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
             "grasps with Q₈ = 0, by the definition (origin not in the interior)",
             int(total["unstable"]), 0.839, 0.0005,
             "3.4 % of grasps have the origin on the boundary of the hull: two contacts carry the "
-            "load; a hull code calls them stable or not by rounding", STATISTICALLY,
+            "load; a hull code calls them stable or not by rounding",
         ),
         row(
             "grasps with the origin strictly outside of the hull",
             int(total["outside"]), 0.839, 0.0005,
             "the paper's figure lies between this one and the one by definition, near this one: as "
             "if its hull code gave tiny positive numbers for most grasps on the boundary",
-            STATISTICALLY,
         ),
-        row("grasps with Q₈ ≥ 0.05", int(total["at_least"][0]), 0.041, 0.0005, "", STATISTICALLY),
-        row("grasps with Q₈ ≥ 0.2", int(total["at_least"][1]), 0.00064, 5e-6, "", STATISTICALLY),
+        row("grasps with Q₈ ≥ 0.05", int(total["at_least"][0]), 0.041, 0.0005, ""),
+        row("grasps with Q₈ ≥ 0.2", int(total["at_least"][1]), 0.00064, 5e-6, ""),
         Row(
-            "largest Q₈ found", "IV.A", "0.4013", f"{largest:.4f}", IN_KIND,
+            "largest Q₈ found", "IV.A", "0.4013", f"{largest:.4f}",
+            "within 0.02 of the paper's, of as many grasps",
             bool(abs(largest - 0.4013) <= 0.02) if count >= 10**8 else None,
             f"of {count:,} grasps; an extreme varies from sample to sample"
             + ("" if count >= 10**8 else ", and the paper took 100,000,000"),
@@ -174,6 +189,9 @@ def fig5(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
     spent = sum(seconds["survey"])
     outcome.times = [(f"{count:,} grasps", "–", f"{spent:.1f} s of one core")]
     outcome.pictures = {"": partial(_histogram, total["histogram"], count)}
+    outcome.captions = {
+        "": f"Q₈ > 0 of {count:,} uniform grasps in D(1), a logarithmic axis. Seed {scale.seed}."
+    }
     return outcome
 
 
@@ -193,19 +211,29 @@ def _histogram(numbers: Floats, count: int) -> Figure:
 def fig6(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: Scale) -> Outcome:
     """A picture of N_ε(g), ε = 0.1."""
     good = _good(0.2, scale)[:1]
-    around = _core.grasps_near(good, 0.1, 150, scale.seed, NEIGHBOURHOODS - 1)
+    around = _core.grasps_near(good, SHOWN_EPSILON, SHOWN, scale.seed, NEIGHBOURHOODS - 1)
+    options = {"friction": scale.friction, "edges": scale.edges}
+    value = float(quality(*split(good), **options)[0])
+    near = np.asarray(quality(*split(around), **options))
     outcome = Outcome()
-    outcome.pictures = {"": partial(_neighbourhood, good, around)}
+    title = f"ε = {SHOWN_EPSILON:g}, n = {SHOWN}, Q = {value:.3f}, its neighbours' {near.min():.3f}"
+    title += f" to {near.max():.3f}"
+    outcome.pictures = {"": partial(_neighbourhood, good, around, title)}
+    outcome.captions = {
+        "": f"The first uniform grasp with Q₈ ≥ 0.2 and {SHOWN} uniform neighbours within "
+        f"ε = {SHOWN_EPSILON:g} of it by d(g, g′); {title}. Seed {scale.seed}."
+    }
     return outcome
 
 
-def _neighbourhood(good: Floats, around: Floats) -> Figure:
-    figure = Figure(figsize=(9.0, 4.4), dpi=110)
+def _neighbourhood(good: Floats, around: Floats, title: str) -> Figure:
+    figure = Figure(figsize=(9.0, 4.3), dpi=110)
+    figure.suptitle(title, fontsize=11, y=0.985)
     camera = Camera(0.7, 0.35)
     contacts, normals, centers = split(around)
     base, axes_of, middle = split(good)
-    left = figure.add_axes((0.0, 0.0, 0.5, 0.92))
-    right = figure.add_axes((0.5, 0.0, 0.5, 0.92))
+    left = figure.add_axes((0.0, 0.0, 0.5, 0.86))
+    right = figure.add_axes((0.5, 0.0, 0.5, 0.86))
     for i in range(3):
         color = FINGERS[i]
         tails = contacts[:, i]
@@ -226,6 +254,7 @@ def _neighbourhood(good: Floats, around: Floats) -> Figure:
     for axes, text in ((left, "contacts, normals and centre of mass (grey)"), (right, "normals")):
         axes.set_aspect("equal")
         axes.axis("off")
+        axes.set_anchor("N")
         axes.set_title(text, fontsize=10)
     return figure
 
@@ -250,12 +279,13 @@ def fig7(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
         outcome.rows += [
             Row(
                 f"grasps with Q₈ ≥ {delta:g} whose neighbourhoods are sampled", "IV.A",
-                f"about {asked:,}", f"{number:,}", IN_KIND,
+                f"about {asked:,}", f"{number:,}",
+                "within 5 % of the paper's, at its scale",
                 abs(number - asked) < 0.05 * asked if scale.name == "paper" else None,
             ),
             Row(
                 f"smallest Q₈ of {SAMPLES[delta]} samples in each N_ε, ε = {paper:g}, four times",
-                "IV.A", "> 0", ", ".join(f"{q:.4f}" for q in sampled[:, at]), IN_KIND,
+                "IV.A", "> 0", ", ".join(f"{q:.4f}" for q in sampled[:, at]), "all four > 0",
                 bool((sampled[:, at] > 0.0).all()), "sampling, as in the paper",
             ),
             Row(
@@ -266,13 +296,14 @@ def fig7(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
             Row(
                 f"ε₈(0, {delta:g}, 1)", "IV.A", f"≥ {paper:g} (estimate)",
                 f"in [{proven:.4f}, {refuted:.4f}]" if refuted else f"at least {proven:.4f}",
-                IN_KIND, refuted is None,
+                f"no pair is found that refutes {paper:g}", refuted is None,
                 "" if refuted is None else
                 f"the paper's {paper:g} does not stand: the search finds a grasp with Q₈ ≥ "
                 f"{delta:g} and one within {refuted:.4f} of it that is lost; with all normals of "
                 "the good grasp away from −e₃, where R(n) is not continuous, within "
-                f"{'none' if limits[0] is None else f'{limits[0]:.4f}'}. The lower end is proven "
-                "(docs/mathematics.md)",
+                f"{'none' if limits[0] is None else f'{limits[0]:.4f}'}. "
+                + ("The lower end is proven (docs/mathematics.md)" if proven > 0.0 else
+                   "Nothing is proven from below: the bound is 0 here"),
             ),
         ]  # fmt: skip
         outcome.series[f"near Q ≥ {delta:g}"] = {
@@ -292,6 +323,11 @@ def fig7(pieces: dict[str, list[Any]], seconds: dict[str, list[float]], scale: S
                 "–",
                 f"{spent:.0f} s of one core",
             )
+        )
+        outcome.captions[f"-{key}"] = (
+            f"Sampled: {SAMPLES[delta]} neighbours of each of {number:,} grasps with Q₈ ≥ "
+            f"{delta:g}, four times. Found: by gradients from {scale.search_starts:,} of such "
+            f"grasps. Seed {scale.seed}."
         )
         outcome.pictures[f"-{key}"] = partial(
             _panel, delta, np.array(epsilons), sampled, np.array(away), np.array(pole)

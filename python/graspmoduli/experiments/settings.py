@@ -36,6 +36,11 @@ class Scale:
     search_rounds: int
     #: Models from which grasps are carried in Fig. 9.
     fig9_sources: str
+    #: Deformations of each kind in Fig. 8.
+    moved: int
+    #: How often Figs. 8 to 12 are run, each time with another seed.
+    seeds: int
+    #: The first of them, and the only one of Figs. 1 to 7.
     seed: int = 0
     friction: float = 1.0
     edges: int = 8
@@ -46,7 +51,7 @@ class Scale:
         return Cone(self.friction, self.edges)
 
 
-#: Three minutes on two cores, and the paper's own sizes.
+#: Less than a minute on two cores, and the paper's own sizes.
 SCALES = {
     "quick": Scale(
         "quick",
@@ -57,8 +62,10 @@ SCALES = {
         near20_pieces=20,
         near20_grasps=100_000,
         search_starts=300,
-        search_rounds=40,
+        search_rounds=20,
         fig9_sources="aij",
+        moved=10,
+        seeds=2,
     ),
     "paper": Scale(
         "paper",
@@ -71,5 +78,7 @@ SCALES = {
         search_starts=3000,
         search_rounds=200,
         fig9_sources="abcdefghijkl",
+        moved=30,
+        seeds=10,
     ),
 }

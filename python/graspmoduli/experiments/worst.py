@@ -94,6 +94,15 @@ def worst_neighbour(
     return Worst(float(values[least]), grasps[least], near[least])
 
 
+def steepest_at_the_pole(good: Floats, cone: Cone = PAPERS_CONE) -> tuple[float, Floats, Floats]:
+    """The largest drop of Q found when a normal leaves −e₃ by :data:`NEAR_POLE`, and the pair."""
+    grasps = _to_the_pole(good)
+    near = _turned(grasps, cone)
+    drop = _values(grasps, cone) - _values(near, cone)
+    most = int(drop.argmax())
+    return float(drop[most]), grasps[most], near[most]
+
+
 def proven_radius(
     delta: float, friction: float = 1.0, edges: int = 8, radius: float = 1.0
 ) -> float:
