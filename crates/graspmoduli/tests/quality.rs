@@ -468,11 +468,19 @@ fn nearly_collinear_grasps_are_answered() {
 
 #[test]
 fn any_friction_and_many_edges_are_answered() {
-    let angle = |i: usize| std::f64::consts::TAU * i as f64 / 5.0;
+    // About a pentagon.
+    let corners = [
+        [1.0, 0.0],
+        [0.31, 0.95],
+        [-0.81, 0.59],
+        [-0.81, -0.59],
+        [0.31, -0.95],
+    ];
     for m in [3, 4, 5] {
         let contacts: Vec<Contact> = (0..m)
             .map(|i| {
-                let point = DVec3::new(angle(i).cos(), angle(i).sin(), 0.1 * i as f64);
+                let [x, y] = corners[i];
+                let point = DVec3::new(x, y, 0.1 * i as f64);
                 Contact {
                     point,
                     normal: -point.normalize(),
