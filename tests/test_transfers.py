@@ -129,12 +129,10 @@ class TestTransfer:
             again = gm.transfer(surface, end.grasp, surface, "ascent")
             assert again.quality <= end.quality * (1 + 1e-5)
 
-    def test_where_nothing_is_allowed_the_grasp_is_lost(self, grasps):
-        lost = gm.transfer(
-            MODELS["a"], grasps["a"], MODELS["e"], "ascent", allowed=np.zeros((3, 3), bool)
-        )
-        assert lost.quality == 0.0
-        assert lost.status == "lost"
+    def test_where_nothing_is_allowed_there_is_no_way(self, grasps):
+        none = np.zeros((3, 3), bool)
+        with pytest.raises(gm.GraspModuliError, match="allowed must allow some contact"):
+            gm.transfer(MODELS["a"], grasps["a"], MODELS["e"], "ascent", allowed=none)
 
     def test_finite_differences_follow_exact_derivatives(self, grasps):
         arguments = MODELS["f"], grasps["f"], MODELS["k"], "gradient"

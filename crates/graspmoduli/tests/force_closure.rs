@@ -258,6 +258,62 @@ const ORDERS: [[usize; 3]; 6] = [
     [2, 1, 0],
 ];
 
+/// A grasp on a real surface that eight edges cannot hold and seven or nine can: two contacts
+/// press against the third along a line that meets the edges of their cones.
+#[test]
+fn a_grasp_of_a_surface_on_the_boundary_is_on_it() {
+    let contact = |p: [f64; 3], n: [f64; 3]| Contact {
+        point: DVec3::from_array(p),
+        normal: DVec3::from_array(n).normalize(),
+    };
+    let contacts = [
+        contact(
+            [
+                0.19177546385390062,
+                0.37669178746686743,
+                -0.24864023379471864,
+            ],
+            [
+                -0.03582085457749526,
+                -0.9983504000466381,
+                0.04487031428523293,
+            ],
+        ),
+        contact(
+            [
+                0.27850465753675996,
+                0.3661831969726993,
+                -0.19975285405254165,
+            ],
+            [
+                -0.3105137398901884,
+                -0.9477254055398634,
+                0.07346953813459078,
+            ],
+        ),
+        contact(
+            [
+                -0.3713321186642678,
+                -0.29956112025196907,
+                0.2729418766624606,
+            ],
+            [0.42765153623844193, 0.9031048386020716, -0.0389334566462703],
+        ),
+    ];
+    let center = DVec3::new(-0.0021448374584608354, 0.0, 0.0);
+    for (l, wanted) in [
+        (7, 0.00112167241),
+        (8, 0.0),
+        (9, 0.00153230913),
+        (16, 0.00158956646),
+    ] {
+        let mut evaluator = Evaluator::new(&FrictionCone::new(1.0, l).unwrap());
+        let quality = evaluator.quality(&contacts, center);
+        assert!(evaluator.take_unconverged().is_none());
+        assert!((quality - wanted).abs() < 1e-10, "{l} {quality}");
+    }
+}
+
 #[test]
 fn grasps_on_lattices_are_force_closure_exactly_where_they_are() {
     let wanted = std::env::var("LATTICE_GRASPS").map_or(Ok(25_000), |text| text.parse());
