@@ -193,8 +193,8 @@ def main(pairs: int, seed: int) -> int:
         seconds = time.perf_counter() - begin
         own, largest = furthest(first, second, (found.u, found.theta), rng)
         value = Decimal(float(found))
-        # What is nearly equal is told apart to the rounding of the coefficients.
-        rounding = 1e-14 * max(s.coefficients.max() for s in (first, second))
+        # What is nearly equal is told apart to the rounding of the coefficients on a common grid.
+        rounding = 128 * 2.0**-52 * max(s.coefficients.max() for s in (first, second))
         off = max(float(abs(value - own)) - rounding, 0.0) / max(float(own), rounding)
         wrong = largest > value + Decimal(found.error) or off > 1e-9
         if wrong:
