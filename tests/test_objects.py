@@ -306,3 +306,18 @@ class TestWrongTypes:
     def test_an_empty_mask_is_honoured(self):
         with pytest.raises(gm.GraspModuliError, match="allowed must allow some contact"):
             gm.transfer(BOTTLE, GRASP, GLASS, "ascent", allowed=np.zeros((3, 3), bool))
+
+
+def test_arrays_that_begin_anywhere_in_memory_are_taken():
+    def misplaced(array):
+        memory = bytearray(array.nbytes + 1)
+        memory[1:] = array.tobytes()
+        return np.frombuffer(memory, dtype=array.dtype, offset=1).reshape(array.shape)
+
+    contacts, normals = misplaced(CIRCLE), misplaced(-CIRCLE)
+    assert not contacts.flags.aligned
+    wanted = gm.quality(CIRCLE, -CIRCLE, ORIGIN)
+    assert gm.quality(contacts, normals, misplaced(np.zeros(3))) == wanted
+    assert gm.quality(contacts[None], normals[None], ORIGIN)[0] == wanted
+    again = gm.Surface.from_coefficients(misplaced(BOTTLE.coefficients), BOTTLE.bottom, BOTTLE.top)
+    assert again == BOTTLE

@@ -38,7 +38,8 @@ def numbers(name: str, value: Any) -> Floats:
             raise GraspModuliError(f"{name} must be an array of numbers, got {brief(value)}")
         if np.ma.is_masked(value):
             raise GraspModuliError(f"{name} must be without masked elements, got {brief(value)}")
-    return array if array.flags.c_contiguous else np.ascontiguousarray(array)
+    # Arrays in the middle of a message, as Dask sends them, need not begin where numbers do.
+    return array if array.flags.c_contiguous and array.flags.aligned else array.copy()
 
 
 def _converted(value: Any) -> Floats | None:

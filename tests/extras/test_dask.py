@@ -89,3 +89,32 @@ def test_no_scheduler_is_one_sentence(tmp_path):
     with pytest.raises(gm.GraspModuliError, match="scheduler must be the address of a Dask"):
         reproduce(["fig12"], out=tmp_path, scheduler="tcp://127.0.0.1:1")
     assert time.monotonic() - begin < 60
+
+
+def test_public_objects_travel_to_workers_and_back():
+    from distributed import Client, LocalCluster
+
+    surface, other = gm.shapes.MODELS["e"], gm.shapes.MODELS["f"]
+    best = gm.synthesize(surface, top=1)[0]
+    things = [
+        surface,
+        best,
+        best.grasp,
+        gm.place(surface, best.grasp),
+        gm.transfer(surface, best.grasp, other),
+        gm.surface_distance(surface, other),
+        gm.distance((surface, best.grasp), (other, best.grasp)),
+        best.wrench_space(),
+        gm.sample_combinations([surface, other], 2),
+    ]
+    with (
+        LocalCluster(
+            n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        for thing in things:
+            back, text = client.submit(lambda x: (x, repr(x)), thing, pure=False).result()
+            assert back == thing
+            assert type(back) is type(thing)
+            assert text == repr(thing)
