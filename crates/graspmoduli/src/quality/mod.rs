@@ -83,8 +83,8 @@ impl Evaluator {
     }
 
     /// Bounds of the last quality that could not be computed, if there was one since this was
-    /// asked: its value was the lower bound. No such grasp is known; should rounding ever keep the
-    /// expanding polytope from an answer, it is not hidden.
+    /// asked: its value was the lower bound. Such grasps are rare, and those that are known have
+    /// coefficients of friction of 1e5 and more.
     pub fn take_unconverged(&mut self) -> Option<[f64; 2]> {
         self.unconverged.take()
     }
