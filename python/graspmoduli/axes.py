@@ -208,6 +208,8 @@ def score(thing: Object, axis: Axis) -> float:
     local = axis.local(thing.samples)
     depth = shape.at_points(local, grid) - np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2)
     missed = float((depth < -CLOSE * thing.size).mean())
-    # A scan from one side sees half of the cells about the true axis, fewer about many others.
-    unseen = max(0.0, 0.6 - seen)
-    return misfit + oval + 0.1 * pinched + 2.0 * missed + 0.4 * unseen
+    # Where no ray hits a mesh there is nothing. A scan from one side sees half of the cells about
+    # the true axis, fewer about many others.
+    mesh = thing.faces is not None
+    unseen = 2.5 * (1.0 - seen) if mesh else 0.4 * max(0.0, 0.6 - seen)
+    return misfit + oval + 0.1 * pinched + 2.0 * missed + unseen

@@ -86,7 +86,8 @@ class Fit(Value):
     coverage: float
     #: Share of the object's outer wall that is not within 2 % of its size of the surface.
     unexplained: float
-    #: Where contacts may lie: cells over u and θ that are explained, or unseen. Shape (k, n).
+    #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
+    #: Shape (k, n).
     allowed: Booleans = field(repr=False)
 
     @property
@@ -105,8 +106,8 @@ class Fit(Value):
         """Different grasps of high quality in the object's own coordinates, best first.
 
         :func:`graspmoduli.synthesize` on the fitted surface, with contacts only where the object
-        is explained by it or was not seen. Torques are divided by :attr:`length_scale` for the
-        quality, which therefore does not depend on the object's unit.
+        is explained by it or, of a scan, was not seen. Torques are divided by
+        :attr:`length_scale` for the quality, which therefore does not depend on the object's unit.
         """
         # Where contacts are not allowed everywhere, more starts find better grasps.
         found = synthesize(
@@ -179,7 +180,7 @@ class Fit(Value):
 
         :func:`graspmoduli.transfer` between the fitted surfaces, each divided by its
         :attr:`length_scale`; the ascent offers contacts only where the target is explained by its
-        surface or was not seen.
+        surface or, of a scan, was not seen.
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
@@ -359,6 +360,9 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     bad = (sticking | rough | (seen & ~good)).reshape(grid.rows, grid.columns)
     # A fingertip's width away from it.
     allowed = ~_dilated(bad, 4 if mesh else 2)
+    if mesh:
+        # Where no ray hits a mesh there is nothing to touch.
+        allowed &= seen.reshape(grid.rows, grid.columns)
     rim = max(1, round(0.03 * grid.rows))
     allowed[:rim] = allowed[-rim:] = False
 
