@@ -21,8 +21,8 @@ def _at(mesh, x=0.0, y=0.0, z=0.0, turn=0.0, about=(1, 0, 0)) -> Trimesh:
 def _box(x, y, z) -> Trimesh:
     """A box with faces of about the same size: long ones are cut."""
     mesh = creation.box((x, y, z))
-    vertices, faces = remesh.subdivide_to_size(mesh.vertices, mesh.faces, max(x, y, z) / 3)
-    return Trimesh(vertices, faces, process=False)
+    cut = remesh.subdivide_to_size(mesh.vertices, mesh.faces, max(x, y, z) / 3)
+    return Trimesh(cut[0], cut[1], process=False)
 
 
 def _rod(radius, length, sections=24):
