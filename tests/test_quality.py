@@ -64,7 +64,7 @@ class TestNumbers:
 @pytest.mark.parametrize("edges", [4, 8, 13])
 def test_values_agree_with_qhull(uniform, friction, edges):
     q = gm.quality(*uniform, friction=friction, edges=edges)
-    chosen = [*np.flatnonzero(q > 0)[:250], *range(60)]
+    chosen = [*np.flatnonzero(q > 0)[:120], *range(40)]
     for i in chosen:
         contacts, normals, center = (array[i] for array in uniform)
         wanted = reference.quality(contacts, normals, center, friction, edges)
@@ -74,9 +74,9 @@ def test_values_agree_with_qhull(uniform, friction, edges):
 @pytest.mark.parametrize("m", [4, 5, 8])
 @pytest.mark.parametrize("edges", [3, 8, 13])
 def test_values_of_more_contacts_agree_with_qhull(m, edges):
-    grasps = uniform_grasps(60, np.random.default_rng(m), m)
+    grasps = uniform_grasps(30, np.random.default_rng(m), m)
     q = gm.quality(*grasps, friction=0.7, edges=edges)
-    assert (q > 0).sum() > 5
+    assert (q > 0).sum() > 2
     for value, contacts, normals, center in zip(q, *grasps, strict=True):
         wanted = reference.quality(contacts, normals, center, 0.7, edges)
         assert value == pytest.approx(max(wanted, 0.0), abs=1e-9)

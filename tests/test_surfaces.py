@@ -108,7 +108,8 @@ def test_integrals_of_a_cone_are_in_closed_form():
 
 
 def test_integrals_agree_with_a_fine_sum(surface):
-    n = 1500
+    # The sum's own error falls with the square of its step: 1e-6 here.
+    n = 1000
     u, theta = np.meshgrid((np.arange(n) + 0.5) / n, TAU * (np.arange(n) + 0.5) / n, indexing="ij")
     u, theta = u.ravel(), theta.ravel()
     area = np.linalg.norm(np.cross(*surface.tangents(u, theta)), axis=1) * TAU / n**2

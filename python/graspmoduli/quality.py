@@ -187,11 +187,11 @@ def quality_gradient(
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
     m, shape = grasps.arrays[0].shape[1], grasps.shape
     rows = _core.quality_gradient(grasps.arrays, grasps.cone)
-    value, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
+    found, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
     # The kernel's derivatives are by lengths over the length scale.
     scale = grasps.scale[..., None]
     return QualityGradient(
-        value=grasps.shaped(value[:, 0].copy()),
+        value=grasps.shaped(locked(found[:, 0].copy())),
         contacts=locked((by_contact / scale).reshape((*shape, m, 3))),
         normals=locked(by_normal.reshape((*shape, m, 3))),
         center_of_mass=locked((by_center / scale).reshape((*shape, 3))),
