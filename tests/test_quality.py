@@ -102,6 +102,15 @@ class TestRelatives:
         total, each = gm.quality(*grasps), gm.quality(*grasps, norm="each")
         assert (each >= total - 1e-12).all()
         assert (each <= 3 * total + 1e-9).all()
+        stable = [part[each > 0.0] for part in grasps]
+        q = each[each > 0.0]
+        for bar in (0.1, q.max(), np.nextafter(q.max(), 1.0)):
+            at_least = gm.quality_at_least(*stable, bar, norm="each")
+            np.testing.assert_array_equal(at_least, q >= bar)
+        best = gm.largest_quality(*stable, norm="each")
+        worst = gm.smallest_quality(*stable, norm="each")
+        assert (best.index, best.quality) == ((q.argmax(),), q.max())
+        assert (worst.index, worst.quality) == ((q.argmin(),), q.min())
 
     def test_soft_fingers_join_two_wrenches_each(self):
         contacts, normals, centers = uniform_grasps(60, np.random.default_rng(22))

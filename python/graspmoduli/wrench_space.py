@@ -68,6 +68,29 @@ class WrenchSpace:
         As in :func:`graspmoduli.quality`. The length scale says how torques are weighed against
         forces: in ``quality`` and ``status``, in which wrench is the ``weakest``, and in the
         ``offsets`` of ``facets``. It does not matter to ``resist``.
+
+    Examples
+    --------
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> space = gm.WrenchSpace(circle, -circle, [0, 0, 0])
+    >>> space.status
+    'force closure'
+
+    The half-spaces {x: ⟨x, v_i⟩ ≤ λ_i} whose intersection is S(g) (Sec. II); the nearest of their
+    boundaries is Q_l away from the origin.
+
+    >>> print(round(space.facets.offsets.min(), 9), round(space.quality, 9))
+    0.544232187 0.544232187
+
+    Forces that hold a weight of 2, the sum of their normal parts, and what a push of 0.5 at a lever
+    of 0.1 asks for:
+
+    >>> bool(np.allclose(space.resist([0, 0, -2, 0, 0, 0]).forces.sum(axis=0), [0, 0, 2]))
+    True
+    >>> space.resist([0.5, 0, 0, 0, 0, 0.05]).normal_force > 0
+    True
     """
 
     _batch: Batch
