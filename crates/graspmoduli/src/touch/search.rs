@@ -26,7 +26,7 @@ const NEIGHBOURS: usize = 16;
 const SURE: f64 = 0.99;
 /// How many of the best subsets are looked at for each grasp that is wanted; then, if they are too
 /// much alike.
-const MANY: [usize; 2] = [40, 800];
+const MANY: [usize; 2] = [40, 200];
 /// A step must raise the quality by this share of it.
 const GAIN: f64 = 1e-9;
 
