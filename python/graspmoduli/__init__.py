@@ -15,7 +15,7 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
                        :func:`transfer_bound`, :func:`epsilon`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
-real objects           :func:`fit`
+real objects           :func:`fit`, :func:`contact_map`
 errors                 :class:`GraspModuliError`, :class:`MissingExtraError`
 =====================  ======================================================================
 
@@ -55,6 +55,9 @@ from .moduli import placed_distance as placed_distance
 from .moduli import sample_combinations as sample_combinations
 from .moduli import sample_weights as sample_weights
 from .moduli import surface_distance as surface_distance
+from .objects.touching import ContactCheck as ContactCheck
+from .objects.touching import ContactMap as ContactMap
+from .objects.touching import contact_map as contact_map
 from .quality import Bounds as Bounds
 from .quality import Extreme as Extreme
 from .quality import QualityGradient as QualityGradient

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import logging
+import math
 import os
 import shutil
 import signal
@@ -146,19 +148,58 @@ def grasp(
         Path | None,
         typer.Option(metavar="FILE", help="Draw object and grasps here (PNG SVG PDF JPG)."),
     ] = None,
-    seed: Annotated[str, typer.Option(help="Seed of sampled contacts.")] = "0",
+    seed: Annotated[str, typer.Option(help="Seed of the places that are tried.")] = "0",
+    fingers: Annotated[
+        str, typer.Option(metavar="M", help="Fingers of a grasp; for a cloud of points 3.")
+    ] = "3",
+    torsion: Annotated[
+        str, typer.Option(metavar="G", help="Torsional friction of soft fingers, a length.")
+    ] = "0",
+    tip_radius: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R", help="Radius of the fingertips, in the object's unit; 5 % of its size."
+        ),
+    ] = None,
+    center_of_mass: Annotated[
+        tuple[str, str, str] | None,
+        typer.Option(metavar="X Y Z", help="Centre of mass; a closed mesh's own if not given."),
+    ] = None,
+    errors: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E", help="Errors of aim, a distance: rank by the quality that they leave."
+        ),
+    ] = None,
 ) -> None:
-    """Find stable three-finger grasps of OBJECT, best first, in its own coordinates."""
+    """Find stable grasps of OBJECT, best first, in its own coordinates.
+
+    On a mesh fingertips are pressed on the mesh itself; a cloud of points is grasped on the surface
+    fitted to it.
+    """
     mu = _number("friction", friction, float)
     l = _number("edges", edges, int)
     _arrays.cone(mu, l)
-    count = _arrays.count("top", _number("top", top, int), 1)
-    start = _arrays.count("seed", _number("seed", seed, int), 0)
+    options: dict[str, Any] = {
+        "friction": mu,
+        "edges": l,
+        "top": _arrays.count("top", _number("top", top, int), 1),
+        "seed": _arrays.count("seed", _number("seed", seed, int), 0),
+        "contacts": _arrays.count("fingers", _number("fingers", fingers, int), 1),
+        "torsion": _arrays.coefficient("torsion", _number("torsion", torsion, float)),
+    }
+    for name, text in (("tip_radius", tip_radius), ("errors", errors)):
+        if text is not None:
+            value = _number(name, text, float)
+            options[name] = _arrays.number(name, value, positive=True)
+    if center_of_mass is not None:
+        center = [_number("center_of_mass", text, float) for text in center_of_mass]
+        options["center_of_mass"] = _arrays.floats("center_of_mass", center)
     # Outputs that cannot be written are found out before the work; all are written at its end.
     _check_outputs(thing, json=json_file, picture=picture)
     image = b""
     with _progress() as step, _warnings():
-        found = _find(thing, mu, l, count, start, step)
+        found = _find(thing, options, step)
         if picture is not None:
             step("drawing", 0.85)
             image = _image(picture, thing, found, mu, l)
@@ -173,8 +214,26 @@ def grasp(
         if path is not None:
             print(f"wrote {path}")
     if not grasps:
-        _signals.say("no force-closure grasp found; more friction or a fuller scan may help")
+        _signals.say(_why_none(fit))
         raise typer.Exit(1)
+    if fit.mesh is not None and grasps[0].quality < WORTHLESS:
+        _signals.say(
+            f"the best grasp has a quality of {grasps[0].quality:.2g} only: the object is too thin "
+            "for these tips, or too long for its friction; smaller tips may find a better one"
+        )
+
+
+#: Grasps of lower quality hold, but hardly.
+WORTHLESS = 0.05
+
+
+def _why_none(fit: Any) -> str:
+    if fit.mesh is None:
+        return "no force-closure grasp found; more friction or a fuller scan may help"
+    return (
+        "no true force-closure grasp found: the object is too thin for these tips, or too "
+        "slippery; a smaller --tip-radius or more friction may help"
+    )
 
 
 @app.command()
@@ -290,7 +349,7 @@ def view(
         server = viewer.serve_shapes(at)
     else:
         with _progress() as step, _warnings():
-            found = _find(thing, mu, l, 5, 0, step)
+            found = _find(thing, {"friction": mu, "edges": l}, step)
             if html is not None:
                 best = found[2][0] if found[2] else None
                 page = viewer.page_of(*found[:2], best, mu, l).encode()
@@ -347,7 +406,7 @@ def _image(path: Path, thing: str, found: Any, friction: float, edges: int) -> b
 
 
 def _find(
-    path: str, friction: float, edges: int, top: int, seed: int, step: Callable[[str, float], None]
+    path: str, options: dict[str, Any], step: Callable[[str, float], None]
 ) -> tuple[Any, Any, Any]:
     step("reading", 0.0)
     from .reading import read
@@ -358,11 +417,16 @@ def _find(
 
     fit = fit_object(thing, lambda done, total: step("fitting", 0.1 + 0.65 * done / total))
     step("finding grasps", 0.8)
-    return thing, fit, fit.synthesize(top=top, friction=friction, edges=edges, seed=seed)
+    return thing, fit, fit.synthesize(**options)
+
+
+#: The version of what ``grasp --json`` writes; docs/object.md describes it.
+SCHEMA = 1
 
 
 def _report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> dict[str, Any]:
     return {
+        "schema": SCHEMA,
         "object": path,
         "fit": {
             "residual_rms": fit.residual.rms,
@@ -375,20 +439,39 @@ def _report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> di
         "friction": friction,
         "edges": edges,
         "length_scale": fit.length_scale,
+        "center_of_mass_of": _center_of(fit),
         "note": "contacts, normals and center_of_mass are in the coordinates of the object's "
         "file; quality is that of lengths divided by length_scale",
-        "grasps": [
-            {
-                "quality": grasp.quality,
-                "contacts": grasp.contacts.tolist(),
-                "normals": grasp.normals.tolist(),
-                "center_of_mass": grasp.center_of_mass.tolist(),
-                "u": grasp.grasp.u.tolist(),
-                "theta": grasp.grasp.theta.tolist(),
-            }
-            for grasp in grasps
-        ],
+        "grasps": [_grasp_report(grasp) for grasp in grasps],
     }
+
+
+def _center_of(fit: Any) -> str:
+    """What the centre of mass is that of, if none was given."""
+    if fit.mesh is None:
+        return "fitted surface"
+    return "solid" if fit.mesh.shape.closed else "triangles"
+
+
+def _grasp_report(grasp: Any) -> dict[str, Any]:
+    coordinates = [
+        [None if math.isnan(x) else x for x in column] for column in grasp.coordinates.T.tolist()
+    ]
+    report = {
+        "quality": grasp.quality,
+        "round_quality": list(grasp.round_quality),
+        "contacts": grasp.contacts.tolist(),
+        "normals": grasp.normals.tolist(),
+        "center_of_mass": grasp.center_of_mass.tolist(),
+        "u": coordinates[0],
+        "theta": coordinates[1],
+    }
+    if grasp.checks is not None:
+        report["exact_quality"] = grasp.exact_quality
+        report["low_quality"] = grasp.low_quality
+        report["held"] = grasp.held
+        report["checks"] = [dataclasses.asdict(check) for check in grasp.checks]
+    return report
 
 
 def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
@@ -412,22 +495,50 @@ def _print(path: str, fit: Any, grasps: Any, edges: int) -> None:
     if grasps:
         console.print()
         console.print(table)
-        console.print(
-            f"\nQ_{edges}: the largest wrench, in any direction, resisted by fingers whose normal "
-            f"forces sum to 1; lengths divided by {fit.length_scale:.4g}.",
-            soft_wrap=True,
-            markup=False,
+        said = [
+            "",
+            "Q: the largest wrench, in any direction, resisted by fingers whose normal forces sum "
+            f"to 1, with round friction cones; Q_{edges} with cones of {edges} edges; lengths "
+            f"divided by {fit.length_scale:.4g}.",
+            *_words(fit, grasps),
+        ]
+        for line in said:
+            console.print(line, soft_wrap=True, markup=False)
+
+
+#: Qualities closer than this share are a tie: the fingers' own errors are larger.
+TIE = 0.05
+
+
+def _words(fit: Any, grasps: Any) -> list[str]:
+    """Which grasps are as good as each other, and how sure their contacts are."""
+    words = []
+    values = [grasp.round_quality[0] for grasp in grasps]
+    equal = sum(value >= (1.0 - TIE) * max(values) for value in values)
+    if equal > 1:
+        words.append(f"{equal} of the grasps are a tie: within {TIE:.0%} of the best.")
+    if fit.mesh is not None:
+        checks = [check for grasp in grasps for check in grasp.checks]
+        angle = math.degrees(max(check.angle for check in checks))
+        bearing = min(check.bearing for check in checks)
+        held = min(grasp.held for grasp in grasps)
+        words.append(
+            f"Every contact lies on the mesh: the normals felt differ from its triangles' by at "
+            f"most {angle:.0f}°, at least {bearing:.0%} of each pad bears, and at least {held:.0%} "
+            "of the errors of aim that were tried leave a grasp in force closure."
         )
+    return words
 
 
 def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
     """Grasps by rank: fingers side by side, or one below the other where it is narrow."""
     table = Table(box=None, padding=(0, 1 if stacked else 2), header_style="bold")
-    columns = ["#", f"Q_{edges}"]
+    columns = ["#", "Q", f"Q_{edges}"]
     if stacked:
         columns += ["finger", "(x, y, z)"]
     else:
-        columns += [f"finger {finger}  (x, y, z)" for finger in (1, 2, 3)]
+        fingers = range(1, 1 + max(len(grasp.contacts) for grasp in grasps)) if grasps else ()
+        columns += [f"finger {finger}  (x, y, z)" for finger in fingers]
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     for rank, grasp in enumerate(grasps, 1):
@@ -435,10 +546,10 @@ def _table(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
             ", ".join(f"{_rounded(x, digits):.{digits}f}" for x in point)
             for point in grasp.contacts
         ]
-        head = [str(rank), f"{grasp.quality:.4f}"]
+        head = [str(rank), f"{grasp.round_quality[0]:.4f}", f"{grasp.quality:.4f}"]
         if stacked:
             for finger, point in enumerate(points, 1):
-                table.add_row(*(head if finger == 1 else ["", ""]), str(finger), point)
+                table.add_row(*(head if finger == 1 else ["", "", ""]), str(finger), point)
         else:
             table.add_row(*head, *points)
     return table

@@ -85,13 +85,16 @@ class Camera:
 
 
 def azimuth_of(surface: Surface, grasp: Grasp) -> float:
-    """Across the plane of the contacts, so that all are seen."""
-    points = surface.points(grasp.u, grasp.theta)
-    # The plane that is nearest to the contacts.
+    """Across the plane of the contacts of a grasp on a surface, so that all are seen."""
+    return azimuth_across(surface.points(grasp.u, grasp.theta))
+
+
+def azimuth_across(points: Floats) -> float:
+    """Across the plane that is nearest to contacts, so that all are seen."""
     normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2][-1]
     if np.hypot(normal[0], normal[1]) < 0.3:
         # A level grasp: any direction shows it.
-        return float(grasp.theta[0]) + 0.9
+        return float(np.arctan2(points[0, 1], points[0, 0]) % (2 * np.pi)) + 0.9
     # Either side of the plane will do; the sign is fixed, so that pictures do not jump.
     side = np.sign(normal[0]) if abs(normal[0]) > 1e-6 else np.sign(normal[1])
     return float(np.arctan2(side * normal[1], side * normal[0])) + 0.35
@@ -112,12 +115,28 @@ def add_grasp(
     scale = surface.radius_about(surface.center_of_mass)
     points = surface.points(grasp.u, grasp.theta)
     normals = surface.normals(grasp.u, grasp.theta)
-    for i in range(len(grasp)):
+    add_fingers(axes, scene, camera, points, normals, scale, friction, edges, labels=labels)
+
+
+def add_fingers(
+    axes: Any,
+    scene: Scene,
+    camera: Camera,
+    points: Floats,
+    normals: Floats,
+    scale: float,
+    friction: float,
+    edges: int,
+    *,
+    labels: bool,
+) -> None:
+    """Cones at contacts, their size by the object's; paints the scene, and the contacts over it."""
+    for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
         color = FINGERS[i % len(FINGERS)]
-        add_cone(scene, camera, points[i], normals[i], color, friction, edges, CONE * scale)
+        add_cone(scene, camera, point, normal, color, friction, edges, CONE * scale)
     scene.draw(axes)
-    for i in range(len(grasp)):
-        add_contact(axes, camera, points[i], normals[i], i, scale, labels)
+    for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
+        add_contact(axes, camera, point, normal, i, scale, labels)
 
 
 def finish(axes: Any) -> None:

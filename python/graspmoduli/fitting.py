@@ -16,22 +16,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Floats, a_callback, a_path, brief, count, finite, floats, locked, vectors
-from ._batches import carried, fingers
+from ._arrays import (
+    Floats,
+    a_callback,
+    a_path,
+    brief,
+    coefficient,
+    count,
+    finite,
+    floats,
+    locked,
+    number,
+    vectors,
+)
+from ._batches import Cone, carried, fingers
 from ._core import GraspModuliError
 from ._files import replacing
 from ._values import Value
 from .axes import candidate_axes, refined, same_axis, score
-from .grasps import Grasp, PlacedGrasp, RankedGrasp, a_grasp
-from .quality import quality
+from .grasps import Grasp, PlacedGrasp, a_grasp
+from .objects.touching import (
+    TIP,
+    ContactCheck,
+    Pressed,
+    Search,
+    TriangleMesh,
+    press,
+    search,
+    tip,
+)
+from .quality import circular_quality, quality
 from .reading import Object, read
 from .surfaces import Surface
-from .synthesis import synthesize
+from .synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from .transfers import transfer
 from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
 
 #: The version of the files that Fit.save writes.
-FILE_VERSION = 1
+FILE_VERSION = 2
 #: More unexplained than this is refused.
 MOST_UNEXPLAINED = 0.4
 #: Axes whose scores, numbers of order 1, are this close are equally good.
@@ -63,14 +85,45 @@ class Residual:
 
 
 @dataclass(frozen=True, eq=False)
-class ObjectGrasp(RankedGrasp):
+class ObjectGrasp(PlacedGrasp):
     """A grasp in the coordinates of a real object.
 
-    Contacts, normals and centre of mass are in the object's coordinates and unit, ``surface`` is
-    the fitted one in its own, and the quality is that of torques divided by ``length_scale``, the
-    object's radius about its centre of mass. ``gm.quality(best)`` is ``best.quality``, and
+    Contacts, normals and centre of mass are in the object's coordinates and unit, and the quality
+    is that of torques divided by ``length_scale``. ``gm.quality(best)`` is ``best.quality``, and
     ``best.wrench_space()`` tells which forces hold against which disturbances.
+
+    On a mesh, contacts are where a fingertip touches it, and normals what the tip feels.
     """
+
+    #: Contact coordinates on the fitted surface; None if a contact is farther from it than 2 % of
+    #: the object's size, so that the grasp has no place in G^cyl.
+    grasp: Grasp | None
+    #: The fitted surface, in its own coordinates.
+    surface: Surface = field(repr=False)
+    #: Q_l.
+    quality: float
+    #: Friction coefficient, or one per contact.
+    friction: float | tuple[float, ...]
+    #: Edges of the friction cones.
+    edges: int
+    #: Torques are divided by it for the quality.
+    length_scale: float
+    #: Torsional friction coefficient, a length.
+    torsion: float = 0.0
+    #: Proven lower and upper bound of the quality with round friction cones, which does not depend
+    #: on the axes of the file.
+    round_quality: tuple[float, float] | None = None
+    #: Coordinates of each contact on the fitted surface, NaN where it is not on it. Shape (m, 2).
+    coordinates: Floats | None = field(default=None, repr=False)
+    #: What the mesh says of each contact, where there is one.
+    checks: tuple[ContactCheck, ...] | None = field(default=None, repr=False)
+    #: Q_l with the normals of the mesh's own triangles where the contacts are.
+    exact_quality: float | None = None
+    #: Share of combinations of errors of aim under which the grasp is force closure; of half a tip
+    #: radius, or what was asked for.
+    held: float | None = None
+    #: Q_l that nine of ten of these errors leave.
+    low_quality: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,47 +142,171 @@ class Fit(Value):
     #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
     #: Shape (k, n).
     allowed: Booleans = field(repr=False)
+    #: The object's mesh, where it came as one: grasps are pressed on it.
+    mesh: TriangleMesh | None = None
+
+    @property
+    def center_of_mass(self) -> Floats:
+        """The object's centre of mass, in its own coordinates. Shape (3,).
+
+        Of a closed mesh that of the solid, its density uniform; of an open one that of its
+        triangles' area; of a cloud of points the fitted surface's z_S.
+        """
+        if self.mesh is not None:
+            return self.mesh.shape.center_of_mass
+        return locked(self.to_object(self.surface.center_of_mass))
 
     @property
     def length_scale(self) -> float:
-        """The surface's radius about its centre of mass: torques are divided by it for Q_l."""
+        """The object's radius about its centre of mass: torques are divided by it for Q_l.
+
+        Of a mesh the largest distance of a vertex; of a cloud of points that of the surface.
+        """
+        return self._surface_radius if self.mesh is None else self.mesh.radius
+
+    @property
+    def _surface_radius(self) -> float:
         return self.surface.radius_about(self.surface.center_of_mass)
 
     @property
     def unit_surface(self) -> Surface:
-        """The surface divided by :attr:`length_scale`: to compare shapes and not sizes."""
-        return (1.0 / self.length_scale) * self.surface
+        """The surface divided by its radius about its own centre of mass: to compare shapes."""
+        return (1.0 / self._surface_radius) * self.surface
 
     def synthesize(
-        self, *, top: int = 5, friction: ArrayLike = 1.0, edges: int = 8, seed: int = 0
+        self,
+        *,
+        contacts: int = 3,
+        torsion: float = 0.0,
+        top: int = 5,
+        friction: ArrayLike = 1.0,
+        edges: int = 8,
+        seed: int = 0,
+        center_of_mass: ArrayLike | None = None,
+        tip_radius: float | None = None,
+        errors: float | None = None,
     ) -> list[ObjectGrasp]:
         """Different grasps of high quality in the object's own coordinates, best first.
 
-        :func:`graspmoduli.synthesize` on the fitted surface, with contacts only where the object
-        is explained by it or, of a scan, was not seen. Torques are divided by
-        :attr:`length_scale` for the quality, which therefore does not depend on the object's unit.
+        Of a mesh, fingertips are pressed on the mesh itself, all over it (:func:`contact_map`):
+        the best of all subsets of the 100 places that are farthest from each other climb over the
+        map and then over the mesh, on pads as flat as four fifths of the best quality allow. What
+        is offered is true: a straight finger from outside lands there, and there is force closure
+        also with the triangles' own normals and for balls of the tip's radius. The first does not
+        lose force closure in 99 of 100 errors of aim of half a tip radius, unless all such grasps
+        are less than half as good.
+
+        Of a cloud of points, :func:`graspmoduli.synthesize` on the fitted surface, with contacts
+        where it explains the cloud or was not seen.
+
+        The order follows the proven bounds for round friction cones, ``round_quality``, or
+        ``low_quality`` if errors are given. Qualities do not depend on the object's unit.
+
+        Parameters
+        ----------
+        contacts
+            Fingers of a grasp; of a cloud of points three.
+        torsion
+            Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
+        top
+            How many grasps are wanted. Fewer come back if fewer are found, none if the object is
+            too thin for these tips or too slippery.
+        friction, edges
+            As in :func:`graspmoduli.quality`; friction positive, a number or one per finger.
+        seed
+            Of the places on the object.
+        center_of_mass
+            Shape (3,), in the object's coordinates; :attr:`center_of_mass` if not given. That of
+            the paper is ``fit.to_object(fit.surface.center_of_mass)``.
+        tip_radius
+            Of the fingertips, balls, in the object's unit; 5 % of its size if not given.
+        errors
+            Errors of aim, a distance, that grasps should stand: they are ranked by the quality
+            that nine of ten errors leave.
         """
+        size = count("contacts", contacts, 1, MOST_CONTACTS)
+        many = count("top", top, 1, MOST_FOLLOWED)
+        hand = (*fingers(friction, edges, size)[:2], coefficient("torsion", torsion))
+        start = count("seed", seed, 0)
+        center = self._center(center_of_mass)
+        if self.mesh is None:
+            return self._of_cloud(size, many, hand, start, center, tip_radius, errors)
+        radius = tip(self.mesh, tip_radius)
+        aim = self._errors(errors, 0.5 * radius * self.mesh.size)
+        wanted = Search(hand, center, self.length_scale, size, many, aim)
+        found = search(self.mesh, radius, start, wanted)
+        grasps = self._touched(found, wanted)
+        # Equal ones stay in the order of their Q_l.
+        key = _round if errors is None else _low
+        return sorted(grasps, key=key, reverse=True)[:many]
+
+    def _center(self, center_of_mass: ArrayLike | None) -> Floats:
+        if center_of_mass is None:
+            return self.center_of_mass
+        center = finite("center_of_mass", floats("center_of_mass", center_of_mass))
+        if center.shape != (3,):
+            raise GraspModuliError(f"center_of_mass must have shape (3,), got {center.shape}")
+        return center
+
+    def _errors(self, errors: float | None, default: float) -> float:
+        if errors is None:
+            return default
+        wanted = number("errors", errors, positive=True)
+        if wanted > 0.25 * self.residual.size:
+            raise GraspModuliError(
+                f"errors must be at most a quarter of the object's size, "
+                f"{0.25 * self.residual.size:.4g}, got {wanted:g}"
+            )
+        return wanted
+
+    def _of_cloud(
+        self,
+        size: int,
+        top: int,
+        hand: Cone,
+        seed: int,
+        center: Floats,
+        tip_radius: float | None,
+        errors: float | None,
+    ) -> list[ObjectGrasp]:
+        mu, edges, torsion = hand
+        if size != 3 or torsion > 0.0:
+            raise GraspModuliError(
+                "contacts must be 3 and torsion 0 for a cloud of points, "
+                f"got {size} and {torsion:g}; a mesh takes others"
+            )
+        for name, value in (("tip_radius", tip_radius), ("errors", errors)):
+            if value is not None:
+                raise GraspModuliError(
+                    f"{name} must be left out for a cloud of points, got {value:g}: fingertips are "
+                    "pressed on meshes only"
+                )
+        scale = self._surface_radius
         # Where contacts are not allowed everywhere, more starts find better grasps.
         found = synthesize(
             self.unit_surface,
             top=top,
-            starts=2 * count("top", top, 1, 1_000) + 6,
-            friction=friction,
+            starts=min(2 * top + 6, MOST_FOLLOWED),
+            friction=mu if len(mu) > 1 else mu[0],
             edges=edges,
             seed=seed,
             allowed=self.allowed,
+            center_of_mass=(center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale,
         )
         # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in those
         # of the object differs slightly from the surface's own.
-        grasps = [self.in_object(ranked.grasp, friction=friction, edges=edges) for ranked in found]
-        return sorted((g for g in grasps if g.quality > 0.0), key=lambda grasp: -grasp.quality)
+        grasps = [self._placed(ranked.grasp, hand, center) for ranked in found]
+        return sorted((g for g in grasps if g.quality > 0.0), key=_round, reverse=True)
 
     def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""
         a_grasp("grasp", grasp)
+        return self._placed(grasp, fingers(friction, edges, len(grasp)), self.center_of_mass)
+
+    def _placed(self, grasp: Grasp, hand: Cone, center: Floats) -> ObjectGrasp:
         contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
         normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
-        return self._object_grasp(grasp, contacts, normals, friction, edges)
+        return self._object_grasp(grasp, contacts, normals, hand, center)
 
     def on_mesh(
         self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
@@ -165,7 +342,10 @@ class Fit(Value):
             face = int(((near - point) ** 2).sum(axis=1).argmin())
             contacts.append(near[face])
             normals.append(np.where(across[face] @ normal < 0.0, -1.0, 1.0) * across[face])
-        return self._object_grasp(grasp, np.array(contacts), np.array(normals), friction, edges)
+        hand = fingers(friction, edges, len(grasp))
+        return self._object_grasp(
+            grasp, np.array(contacts), np.array(normals), hand, self.center_of_mass
+        )
 
     def transfer_to(
         self,
@@ -179,8 +359,10 @@ class Fit(Value):
         """A grasp of this object carried to another one, in that one's own coordinates.
 
         :func:`graspmoduli.transfer` between the fitted surfaces, each divided by its
-        :attr:`length_scale`; the ascent offers contacts only where the target is explained by its
-        surface or, of a scan, was not seen.
+        radius about its own centre of mass; the ascent offers contacts only where the target is
+        explained by its surface or, of a scan, was not seen. On a target with a mesh the contacts
+        are then pressed on the mesh, where a tip of 5 % of its size touches near them, and climb
+        there; where that leaves nothing true, an error says so.
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
@@ -189,26 +371,78 @@ class Fit(Value):
         carried = transfer(
             start, grasp, end, method, friction=friction, edges=edges, allowed=allowed
         )
-        return target.in_object(carried.grasp, friction=friction, edges=edges)
+        arrived = target.in_object(carried.grasp, friction=friction, edges=edges)
+        if target.mesh is None:
+            return arrived
+        hand = fingers(friction, edges, len(grasp))
+        aim = 0.5 * TIP * target.mesh.size
+        wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
+        pressed = press(target.mesh, TIP, arrived.contacts, arrived.normals, wanted)
+        if pressed is None:
+            raise GraspModuliError(
+                "grasp must be one that the target's mesh can be grasped with, got contacts that "
+                f"no tip reaches or that lose force closure there (on its surface Q is "
+                f"{arrived.quality:.3g})"
+            )
+        return target._touched([pressed], wanted)[0]
+
+    def _touched(self, found: list[Pressed], wanted: Search) -> list[ObjectGrasp]:
+        """Grasps pressed on the mesh, with coordinates on the surface where they lie there."""
+        if not found:
+            return []
+        contacts = np.stack([one.contacts for one in found])
+        local = (contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
+        us, thetas, distances = self.surface.coordinates(local)
+        grasps = []
+        for one, u, theta, on in zip(
+            found, us, thetas, distances <= CLOSE * self.residual.size, strict=True
+        ):
+            made = self._object_grasp(
+                Grasp(u, theta) if on.all() else None,
+                one.contacts,
+                one.normals,
+                wanted.hand,
+                wanted.center_of_mass,
+                coordinates=locked(np.where(on[:, None], np.stack([u, theta], axis=1), np.nan)),
+                checks=one.checks,
+                exact_quality=one.exact_quality,
+                held=one.held,
+                low_quality=one.low_quality,
+            )
+            grasps.append(made)
+        return grasps
 
     def _object_grasp(
-        self, grasp: Grasp, contacts: Floats, normals: Floats, friction: ArrayLike, edges: int
+        self,
+        grasp: Grasp | None,
+        contacts: Floats,
+        normals: Floats,
+        hand: Cone,
+        center: Floats,
+        **others: Any,
     ) -> ObjectGrasp:
-        hand = fingers(friction, edges, len(grasp))
-        made = PlacedGrasp(contacts, normals, self.to_object(self.surface.center_of_mass))
+        made = PlacedGrasp(contacts, normals, center)
         options = {
             "friction": carried(hand),
             "edges": hand[1],
             "length_scale": self.length_scale,
         }
+        bounds = circular_quality(
+            made, friction=options["friction"], length_scale=options["length_scale"]
+        )
+        if grasp is not None and "coordinates" not in others:
+            others["coordinates"] = locked(np.stack([grasp.u, grasp.theta], axis=1))
         return ObjectGrasp(
             made.contacts,
             made.normals,
             made.center_of_mass,
             grasp=grasp,
             surface=self.surface,
-            quality=quality(made, **options),
+            quality=quality(made, torsion=hand[2], **options),
+            torsion=hand[2],
+            round_quality=(bounds.lower, bounds.upper),
             **options,
+            **others,
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -223,6 +457,14 @@ class Fit(Value):
                 residual=[self.residual.rms, self.residual.max, self.residual.size],
                 shares=[self.coverage, self.unexplained],
                 allowed=self.allowed,
+                **(
+                    {}
+                    if self.mesh is None
+                    else {
+                        "vertices": self.mesh.vertices,
+                        "faces": self.mesh.faces,
+                    }
+                ),
             )
 
     @classmethod
@@ -242,6 +484,7 @@ class Fit(Value):
                         coverage=coverage,
                         unexplained=unexplained,
                         allowed=data["allowed"].astype(bool, casting="no"),
+                        mesh=_saved_mesh(data),
                     )
         except FileNotFoundError:
             raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None
@@ -263,6 +506,29 @@ class Fit(Value):
         """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
         given = finite("directions", vectors("directions", directions, "(..., 3)"))
         return given @ self.pose[:3, :3].T
+
+
+def _saved_mesh(data: Any) -> TriangleMesh | None:
+    if "vertices" not in data:
+        return None
+    size = float(data["residual"][2])
+    vertices = floats("vertices", data["vertices"]).reshape(-1, 3)
+    faces = data["faces"].astype(np.int64, casting="no").reshape(-1, 3)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise GraspModuliError("faces must be among the vertices")
+    return TriangleMesh(vertices, faces, size)
+
+
+def _round(grasp: ObjectGrasp) -> float:
+    """What ranks a grasp: what is proven for round cones, or Q_l of soft fingers."""
+    if grasp.torsion > 0.0 or grasp.round_quality is None:
+        return grasp.quality
+    return grasp.round_quality[0]
+
+
+def _low(grasp: ObjectGrasp) -> float:
+    """What ranks a grasp under errors of aim."""
+    return 0.0 if grasp.low_quality is None else grasp.low_quality
 
 
 def fit(
@@ -343,15 +609,15 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     good = np.bincount(hits.cell[explained], minlength=cells) > 0
     sticking = np.bincount(hits.cell[outside], minlength=cells) > (0 if mesh else 2)
     unexplained = float((seen & (~good | sticking)).sum() / max(seen.sum(), 1))
-    if unexplained > MOST_UNEXPLAINED:
+    if unexplained > MOST_UNEXPLAINED and not mesh:
         raise GraspModuliError(
             "object must be close to a surface in cylindrical coordinates about some axis, "
             f"got one whose outer wall is not for {unexplained:.0%}"
         )
     if unexplained > WORTH_A_WARNING:
         warnings.warn(
-            f"{unexplained:.1%} of the object's outer wall is not explained by the fitted "
-            "surface; no grasp is offered there",
+            f"{unexplained:.1%} of the object's outer wall is not explained by the fitted surface; "
+            + ("grasps there have no contact coordinates" if mesh else "no grasp is offered there"),
             stacklevel=stacklevel,
         )
     # A wall that leans more than the surface, such as a lid's rim, is not what a finger meets.
@@ -377,6 +643,7 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
         coverage=_coverage(surface, good.reshape(grid.rows, grid.columns), mesh),
         unexplained=unexplained,
         allowed=allowed,
+        mesh=TriangleMesh.of(thing),
     )
 
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from ._arrays import count, floats
+from ._arrays import Floats, count, floats
 from ._core import GraspModuliError
 from .drawing import (
     BODY,
@@ -26,8 +26,10 @@ from .drawing import (
     Camera,
     Scene,
     add_body,
+    add_fingers,
     add_grasp,
     add_net,
+    azimuth_across,
     azimuth_of,
     finish,
 )
@@ -77,7 +79,7 @@ def plot_grasps(
     )  # fmt: skip
     upper = rows[0].subgridspec(1, 2, wspace=0.02)
     if grasps:
-        azimuth = azimuth_of(fit.surface, grasps[0].grasp)
+        azimuth = azimuth_across(_local(fit, grasps[0])[0])
         for column, turn in enumerate((0.0, np.pi)):
             axes = figure.add_subplot(upper[column])
             _draw(axes, thing, fit, grasps[0], azimuth + turn, friction, edges, labels=True)
@@ -93,7 +95,7 @@ def plot_grasps(
                 thing,
                 fit,
                 grasp,
-                azimuth_of(fit.surface, grasp.grasp),
+                azimuth_across(_local(fit, grasp)[0]),
                 friction,
                 edges,
                 labels=False,
@@ -381,11 +383,18 @@ def _draw(
     camera = Camera(azimuth, ELEVATION)
     scene = Scene()
     _add_object(scene, camera, thing, fit)
-    add_net(scene, camera, fit.surface)
-    add_grasp(
-        axes, scene, camera, fit.surface, grasp.grasp, friction=friction, edges=edges, labels=labels
-    )
+    if fit.mesh is None or grasp.grasp is not None:
+        add_net(scene, camera, fit.surface)
+    points, normals = _local(fit, grasp)
+    scale = fit.length_scale
+    add_fingers(axes, scene, camera, points, normals, scale, friction, edges, labels=labels)
     finish(axes)
+
+
+def _local(fit: Fit, grasp: ObjectGrasp) -> tuple[Floats, Floats]:
+    """Contacts and normals in the coordinates of the fitted surface."""
+    rotation, origin = fit.pose[:3, :3], fit.pose[:3, 3]
+    return (grasp.contacts - origin) @ rotation, grasp.normals @ rotation
 
 
 def _add_object(scene: Scene, camera: Camera, thing: Object, fit: Fit) -> None:

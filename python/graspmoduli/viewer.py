@@ -19,7 +19,7 @@ import numpy as np
 
 from ._arrays import Floats
 from ._core import GraspModuliError
-from .drawing import BODY, FILLED, FINGERS, NET, SEEN, azimuth_of
+from .drawing import BODY, FILLED, FINGERS, NET, SEEN, azimuth_across, azimuth_of
 from .fitting import Fit, ObjectGrasp
 from .grasps import Grasp, place
 from .quality import quality
@@ -233,7 +233,7 @@ class GraspPage:
     ) -> None:
         self.client, self.fit, self.grasps = client, fit, grasps
         self.surface = (1.0 / fit.length_scale) * fit.surface
-        self.grasp = grasps[0].grasp if grasps else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
+        self.grasp = on_wall(fit, grasps[0]) if grasps else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
         self.lock = threading.RLock()
         self.climbing = False
         scene, gui = client.scene, client.gui
@@ -270,7 +270,8 @@ class GraspPage:
 
         def choose(_: Any) -> None:
             if self.grasps:
-                self.show(self.grasps[min(int(self.rank.value), len(self.grasps)) - 1].grasp)
+                chosen = self.grasps[min(int(self.rank.value), len(self.grasps)) - 1]
+                self.show(on_wall(fit, chosen))
 
         self.rank.on_update(choose)
         self.friction.on_update(lambda _: self.show(self.grasp))
@@ -595,26 +596,37 @@ def serve_shapes(port: int, own: dict[str, Surface] | None = None) -> Any:
     return server
 
 
+def on_wall(fit: Fit, grasp: ObjectGrasp) -> Grasp:
+    """A grasp's contact coordinates, of contacts off the fitted surface those nearest to them."""
+    if grasp.grasp is not None:
+        return grasp.grasp
+    local = (grasp.contacts - fit.pose[:3, 3]) @ fit.pose[:3, :3]
+    u, theta, _ = fit.surface.coordinates(local)
+    return Grasp(u, theta)
+
+
 def page_of(thing: Object, fit: Fit, grasp: ObjectGrasp | None, friction: float, edges: int) -> str:
     """The scene as one page that opens without a server or a network."""
     server = open_server(0)
     try:
         scene = server.scene
+        turn = 0.0
         scene.set_up_direction("+z")
         surface = (1.0 / fit.length_scale) * fit.surface
         draw_object(scene, thing, fit)
         draw_net(scene, surface)
         if grasp is not None:
-            placed = place(surface, grasp.grasp)
-            for index in range(len(grasp.grasp)):
-                point, normal = placed.contacts[index], placed.normals[index]
+            turned, origin = fit.pose[:3, :3], fit.pose[:3, 3]
+            contacts = (grasp.contacts - origin) @ turned / fit.length_scale
+            normals = grasp.normals @ turned
+            turn = azimuth_across(contacts)
+            for index, (point, normal) in enumerate(zip(contacts, normals, strict=True)):
                 draw_finger(scene, index, point, normal, friction, edges)
                 scene.add_icosphere(f"/ball {index + 1}", 0.04, rgb(FINGERS[index]), position=point)
             scene.add_label(
                 "/quality", f"Q_{edges} = {grasp.quality:.4f} (μ = {friction:g})",
                 position=(0.0, 0.0, 1.25 * surface.top), anchor="bottom-center",
             )  # fmt: skip
-        turn = 0.0 if grasp is None else azimuth_of(surface, grasp.grasp)
         server.initial_camera.position = (2.3 * np.cos(turn), 2.3 * np.sin(turn), 0.8)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         return server.scene.as_html()

@@ -5,6 +5,7 @@ mod domain;
 mod math;
 mod pool;
 mod quality;
+mod touch;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::FrictionCone;
@@ -448,6 +449,8 @@ mod _core {
         circular_quality, contact_forces, extreme_quality, is_clean, quality, quality_at_least,
         quality_gradient, quality_of_one, tangents, weakest,
     };
+    #[pymodule_export]
+    use super::touch::Mesh;
     #[pymodule_export]
     use super::{
         GraspModuliError, PyDeformation, Surface, best_subsets, combine, sample_points,

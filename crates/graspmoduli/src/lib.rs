@@ -26,6 +26,7 @@
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
 //! | [`domain`] | random grasps in the domain D(1), and near each other |
 //! | [`transfer`] | carrying grasps from one surface to another |
+//! | `touch` | fingertips pressed on triangle meshes, and grasps of them: with the feature `objects` |
 //! | [`math`] | sine, cosine and the like, the same on every processor |
 //! | [`error`] | what can be wrong with a request |
 //!
@@ -45,4 +46,6 @@ pub mod search;
 mod spline;
 pub mod surface;
 pub mod synthesis;
+#[cfg(feature = "objects")]
+pub mod touch;
 pub mod transfer;

@@ -1,0 +1,170 @@
+//! What of a grasp is true: what rays, balls and badly aimed fingers find at its contacts.
+
+use super::OUTSIDE;
+use super::map::Place;
+use super::mesh::Mesh;
+use super::press::{ALIKE, Tip, land_along};
+use super::search::Wanted;
+use crate::contact::Frame;
+use crate::math;
+use crate::quality::Evaluator;
+use glam::DVec3;
+use std::f64::consts::TAU;
+
+/// With exact normals, and by the ball, this share of the quality must be left.
+const LEFT: f64 = 0.1;
+/// A ball must touch this close to the contact, over its radius.
+const BESIDE: f64 = 0.6;
+/// Errors of aim: how many combinations are tried.
+const DRAWS: usize = 343;
+/// Rings about the axis of a finger, over the tip's radius, and rays on each.
+const ROOM: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
+const AROUND: usize = 12;
+
+/// What the mesh says of a grasp.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checked {
+    /// Q_l with the normals of the triangles on which rays land.
+    pub exact: f64,
+    /// Q_l of balls of the tip's radius: where they touch first, and the directions there.
+    pub ball: f64,
+    /// Share of combinations of errors of aim under which the grasp is force closure.
+    pub holds: f64,
+    /// Q_l that nine of ten of these reach.
+    pub low: f64,
+    /// For each contact.
+    pub contacts: Vec<CheckedContact>,
+}
+
+/// What the mesh says of a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckedContact {
+    /// From the nearest point of the mesh.
+    pub distance: f64,
+    /// Cosine of the angle between the normal felt and that of the triangle.
+    pub cosine: f64,
+    /// Radius about the finger's axis within which nothing stands in its way.
+    pub clearance: f64,
+}
+
+/// The checks, or `None` if the grasp is not true: if a ray or a ball does not land at a contact,
+/// if the triangle there is turned by more than 30°, or if there is no force closure with the exact
+/// normals or by the balls.
+pub fn check(
+    mesh: &Mesh,
+    tip: &Tip,
+    places: &[Place],
+    quality: f64,
+    wanted: &Wanted<'_>,
+    evaluator: &mut Evaluator,
+) -> Option<Checked> {
+    if quality <= 0.0 {
+        return None;
+    }
+    let mut exact = Vec::new();
+    let mut touched = Vec::new();
+    let mut contacts = Vec::new();
+    for place in places {
+        let landing = land_along(mesh, place.point, place.normal)?;
+        let cosine = landing.normal.dot(place.normal);
+        // The contact is where such a ray landed before.
+        if (landing.point - place.point).length() > 1e-6 || cosine < ALIKE {
+            return None;
+        }
+        exact.push(wanted.contact(landing.point, landing.normal));
+        let start = place.point - place.normal * OUTSIDE;
+        let touch = mesh.sweep(start, place.normal, tip.radius())?;
+        if (touch.point - place.point).length() > BESIDE * tip.radius() {
+            return None;
+        }
+        let middle = start + place.normal * touch.distance;
+        let normal = (touch.point - middle) / tip.radius();
+        touched.push(wanted.contact(touch.point, normal.normalize()));
+        let (near, _) = mesh.nearest(place.point)?;
+        contacts.push(CheckedContact {
+            distance: (near - place.point).length(),
+            cosine,
+            clearance: clearance(mesh, tip, place),
+        });
+    }
+    let exact = evaluator.quality(&exact, DVec3::ZERO);
+    let ball = evaluator.quality(&touched, DVec3::ZERO);
+    if exact < LEFT * quality || ball < LEFT * quality {
+        return None;
+    }
+    let (holds, low) = under_errors(mesh, tip, places, wanted, evaluator);
+    Some(Checked {
+        exact,
+        ball,
+        holds,
+        low,
+        contacts,
+    })
+}
+
+/// The widest ring about the axis in which no ray is stopped a tip's radius before the contact.
+fn clearance(mesh: &Mesh, tip: &Tip, place: &Place) -> f64 {
+    let [x, y] = Frame::new(place.normal).tangents;
+    let mut free = 0.0;
+    for ring in ROOM {
+        let radius = ring * tip.radius();
+        let open = (0..AROUND).all(|k| {
+            let (sin, cos) = math::sin_cos(TAU * k as f64 / AROUND as f64);
+            let start = place.point + (x * cos + y * sin) * radius - place.normal * OUTSIDE;
+            mesh.ray(start, place.normal)
+                .is_none_or(|hit| hit.distance > OUTSIDE - tip.radius())
+        });
+        if !open {
+            break;
+        }
+        free = radius;
+    }
+    free
+}
+
+/// Share of force closures among fingers that aim beside their contacts, each in its middle or in
+/// one of six directions, and the quality that nine of ten reach. A finger that misses has none.
+fn under_errors(
+    mesh: &Mesh,
+    tip: &Tip,
+    places: &[Place],
+    wanted: &Wanted<'_>,
+    evaluator: &mut Evaluator,
+) -> (f64, f64) {
+    let aims: Vec<[Option<_>; 7]> = places
+        .iter()
+        .map(|place| {
+            let [x, y] = Frame::new(place.normal).tangents;
+            std::array::from_fn(|k| {
+                let reach = if k == 0 { 0.0 } else { wanted.errors };
+                let (sin, cos) = math::sin_cos(TAU * k as f64 / 6.0);
+                let aim = place.point + (x * cos + y * sin) * reach;
+                let pressed = tip.press(mesh, aim, place.normal)?;
+                let landing = pressed.landing?;
+                Some(wanted.contact(landing.point, pressed.felt))
+            })
+        })
+        .collect();
+    let mut values: Vec<f64> = (0..DRAWS)
+        .map(|draw| {
+            let chosen: Option<Vec<_>> = aims
+                .iter()
+                .enumerate()
+                .map(|(finger, own)| own[choice(draw, finger)])
+                .collect();
+            chosen.map_or(0.0, |contacts| evaluator.quality(&contacts, DVec3::ZERO))
+        })
+        .collect();
+    values.sort_by(f64::total_cmp);
+    let lost = values.partition_point(|&value| value <= 0.0);
+    (1.0 - lost as f64 / DRAWS as f64, values[DRAWS / 10])
+}
+
+/// Which of seven aims a finger takes: all combinations for three fingers, for more an even choice.
+fn choice(draw: usize, finger: usize) -> usize {
+    if finger < 3 {
+        draw / 7_usize.pow(finger as u32) % 7
+    } else {
+        (draw * (2 * finger + 5) + draw / 7 + draw / 49) % 7
+    }
+}

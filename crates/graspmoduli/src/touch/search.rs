@@ -1,0 +1,448 @@
+//! The best grasps among the places of a map: by exact search over some, then climbed over all.
+
+use super::gate::{self, Checked};
+use super::map::Place;
+use super::mesh::Mesh;
+use super::polish::{self, polish};
+use super::press::Tip;
+use crate::contact::{Contact, FrictionCone};
+use crate::error::Error;
+use crate::quality::Evaluator;
+use crate::search::best_subsets;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Shares of a pad that may differ from what it feels, the flattest first.
+const LIMITS: [f64; 6] = [0.0, 0.1, 0.2, 0.35, 0.5, 1.0];
+/// The flattest pads are taken whose best grasp has this share of the best of all.
+const SHARE: f64 = 0.8;
+/// About so many subsets are searched.
+const SUBSETS: u64 = 170_000;
+/// Neighbours of a place on the map.
+const NEIGHBOURS: usize = 16;
+/// A grasp that holds in this share of errors of aim is not lost by them.
+const SURE: f64 = 0.99;
+/// How many of the best subsets are looked at for each grasp that is wanted; then, if they are too
+/// much alike.
+const MANY: [usize; 2] = [40, 200];
+/// A step must raise the quality by this share of it.
+const GAIN: f64 = 1e-9;
+
+/// What is looked for, and with which fingers.
+#[derive(Debug, Clone)]
+pub struct Wanted<'a> {
+    /// The fingers' friction cones.
+    pub cone: &'a FrictionCone,
+    /// The object's centre of mass.
+    pub center: DVec3,
+    /// The size of the object over the length by which torques are divided.
+    pub scale: f64,
+    /// Contacts of a grasp.
+    pub fingers: usize,
+    /// How many grasps.
+    pub top: usize,
+    /// Of any two grasps at least one contact differs by this much.
+    pub apart: f64,
+    /// Errors of aim, a length, under which grasps are tried.
+    pub errors: f64,
+}
+
+/// A grasp of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Where the fingers press.
+    pub places: Vec<Place>,
+    /// Q_l with the normals that they feel.
+    pub quality: f64,
+    /// What the mesh says of it.
+    pub checked: Checked,
+}
+
+impl Wanted<'_> {
+    /// A contact as the quality sees it.
+    pub(crate) fn contact(&self, point: DVec3, normal: DVec3) -> Contact {
+        Contact {
+            point: (point - self.center) * self.scale,
+            normal,
+        }
+    }
+
+    fn contacts(&self, places: &[Place]) -> Vec<Contact> {
+        places
+            .iter()
+            .map(|place| self.contact(place.point, place.normal))
+            .collect()
+    }
+
+    /// Q_l of fingers that press at places.
+    pub(crate) fn quality(&self, evaluator: &mut Evaluator, places: &[Place]) -> f64 {
+        evaluator.quality(&self.contacts(places), DVec3::ZERO)
+    }
+
+    /// Q_l if it is more than `best`.
+    pub(crate) fn better(
+        &self,
+        evaluator: &mut Evaluator,
+        places: &[Place],
+        best: f64,
+    ) -> Option<f64> {
+        let bar = best * (1.0 + GAIN);
+        let quality = evaluator.quality_up_to(&self.contacts(places), DVec3::ZERO, bar);
+        (quality > bar).then_some(quality)
+    }
+
+    /// How many grasps are polished.
+    fn candidates(&self) -> usize {
+        2 * self.top + 2
+    }
+
+    /// Do two grasps differ, in whatever order their contacts are compared?
+    fn differ(&self, one: &[Place], other: &[Place]) -> bool {
+        !matched(one, other, self.apart, &mut vec![false; other.len()])
+    }
+}
+
+/// Can contacts be paired so that no pair is `apart`?
+fn matched(one: &[Place], other: &[Place], apart: f64, taken: &mut [bool]) -> bool {
+    let Some((first, rest)) = one.split_first() else {
+        return true;
+    };
+    for k in 0..other.len() {
+        if !taken[k] && (first.point - other[k].point).length() <= apart {
+            taken[k] = true;
+            if matched(rest, other, apart, taken) {
+                return true;
+            }
+            taken[k] = false;
+        }
+    }
+    false
+}
+
+/// Different grasps among the places of a map, true ones by what [`gate`] asks, best first.
+pub fn grasps(
+    mesh: &Mesh,
+    tip: &Tip,
+    map: &[Place],
+    wanted: &Wanted<'_>,
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<Vec<Found>, Error> {
+    let (flat, limit) = flattest(map, wanted, threads, stop)?;
+    let mut found = checked(mesh, tip, &flat, limit, wanted, stop)?;
+    if found.is_empty() && limit < 1.0 {
+        // What the flattest pads promise may fail at the gate.
+        let all = candidates(map, wanted, &MANY, threads, stop)?;
+        found = checked(mesh, tip, &all, 1.0, wanted, stop)?;
+    }
+    Ok(found)
+}
+
+/// Candidates on the flattest places that are good enough, and how flat these are.
+fn flattest(
+    map: &[Place],
+    wanted: &Wanted<'_>,
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<(Vec<Vec<Place>>, f64), Error> {
+    let mut evaluator = Evaluator::new(wanted.cone);
+    let mut best = |places: &[Place]| -> Result<f64, Error> {
+        let grasps = candidates(places, wanted, &MANY[..1], threads, stop)?;
+        let values = grasps.iter().map(|g| wanted.quality(&mut evaluator, g));
+        Ok(values.fold(0.0, f64::max))
+    };
+    let bar = SHARE * best(map)?;
+    let mut tried = 0;
+    for limit in LIMITS {
+        let flat: Vec<_> = map.iter().copied().filter(|p| p.off <= limit).collect();
+        // No more places than before are no better.
+        if flat.len() > tried && (flat.len() == map.len() || best(&flat)? >= bar) {
+            return Ok((candidates(&flat, wanted, &MANY, threads, stop)?, limit));
+        }
+        tried = flat.len();
+    }
+    Ok((Vec::new(), LIMITS[LIMITS.len() - 1]))
+}
+
+/// Different grasps on a map that no step to a neighbour improves, best first.
+fn candidates(
+    map: &[Place],
+    wanted: &Wanted<'_>,
+    tries: &[usize],
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<Vec<Vec<Place>>, Error> {
+    let spread = farthest(map, wanted.fingers);
+    let contacts: Vec<_> = spread
+        .iter()
+        .map(|&k| wanted.contact(map[k].point, map[k].normal))
+        .collect();
+    // Fingers that differ are handed out when it is known where they go.
+    let cone = wanted.cone.least_friction();
+    let mut starts = Vec::new();
+    for many in tries {
+        let heed = |_, _| {
+            if stop.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let ranked = best_subsets(
+            &contacts,
+            &[],
+            DVec3::ZERO,
+            &cone,
+            wanted.fingers,
+            many * wanted.top.max(5),
+            threads,
+            heed,
+        )?;
+        let grasps = ranked
+            .iter()
+            .map(|r| r.indices.iter().map(|&k| map[spread[k]]).collect());
+        starts = different(grasps, 6 * wanted.top, wanted);
+        if starts.len() >= wanted.candidates() {
+            break;
+        }
+    }
+    let neighbours = neighbours(map);
+    let climbed: Vec<_> = starts
+        .par_iter()
+        .map(|start| {
+            let mut evaluator = Evaluator::new(wanted.cone);
+            climb(map, &neighbours, start, &[], wanted, &mut evaluator)
+        })
+        .collect();
+    let mut kept = different(best_first(climbed), wanted.candidates(), wanted);
+    // Where many climb to the same place, some stop short of it.
+    let mut evaluator = Evaluator::new(wanted.cone);
+    for start in &starts {
+        if kept.len() >= wanted.candidates() {
+            break;
+        }
+        if kept.iter().all(|other| wanted.differ(start, other)) {
+            let (_, grasp) = climb(map, &neighbours, start, &kept, wanted, &mut evaluator);
+            kept.push(grasp);
+        }
+    }
+    Ok(kept)
+}
+
+/// By quality; equal ones stay in their order.
+fn best_first(mut grasps: Vec<(f64, Vec<Place>)>) -> impl Iterator<Item = Vec<Place>> {
+    grasps.sort_by(|a, b| b.0.total_cmp(&a.0));
+    grasps.into_iter().map(|(_, grasp)| grasp)
+}
+
+/// The first `most` that differ from all before them.
+fn different(
+    grasps: impl Iterator<Item = Vec<Place>>,
+    most: usize,
+    wanted: &Wanted<'_>,
+) -> Vec<Vec<Place>> {
+    let mut kept: Vec<Vec<Place>> = Vec::new();
+    for grasp in grasps {
+        if kept.len() == most {
+            break;
+        }
+        if kept.iter().all(|other| wanted.differ(&grasp, other)) {
+            kept.push(grasp);
+        }
+    }
+    kept
+}
+
+/// So many places that all their subsets can be searched, each the farthest from those before it.
+fn farthest(map: &[Place], fingers: usize) -> Vec<usize> {
+    let mut most = fingers;
+    while most < 100 && subsets(most + 1, fingers) <= SUBSETS {
+        most += 1;
+    }
+    let mut chosen = Vec::new();
+    // Opposite sides of a thin wall are different places.
+    let mut away = vec![f64::INFINITY; map.len()];
+    let mut next = 0;
+    while chosen.len() < most.min(map.len()) {
+        chosen.push(next);
+        away[next] = f64::NEG_INFINITY;
+        let place = map[next];
+        let mut far = f64::NEG_INFINITY;
+        for (k, other) in map.iter().enumerate() {
+            away[k] = away[k].min(gap(&place, other));
+            if away[k] > far {
+                (next, far) = (k, away[k]);
+            }
+        }
+    }
+    chosen
+}
+
+fn subsets(n: usize, m: usize) -> u64 {
+    (0..m as u64).fold(1, |product, k| product * (n as u64 - k) / (k + 1))
+}
+
+/// How far two places are from each other: in space, and by a tenth for opposite normals.
+fn gap(one: &Place, other: &Place) -> f64 {
+    (one.point - other.point).length_squared()
+        + 0.0025 * (one.normal - other.normal).length_squared()
+}
+
+/// The nearest places of each.
+fn neighbours(map: &[Place]) -> Vec<Vec<usize>> {
+    map.par_iter()
+        .enumerate()
+        .map(|(k, place)| {
+            let mut near: Vec<_> = (0..map.len())
+                .filter(|&j| j != k)
+                .map(|j| (gap(place, &map[j]), j))
+                .collect();
+            let order =
+                |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+            if near.len() > NEIGHBOURS {
+                near.select_nth_unstable_by(NEIGHBOURS, order);
+                near.truncate(NEIGHBOURS);
+            }
+            near.sort_by(order);
+            near.into_iter().map(|(_, j)| j).collect()
+        })
+        .collect()
+}
+
+/// From place to neighbouring place, one finger at a time, while the quality grows; not to where
+/// the grasp no longer differs from others.
+fn climb(
+    map: &[Place],
+    neighbours: &[Vec<usize>],
+    start: &[Place],
+    others: &[Vec<Place>],
+    wanted: &Wanted<'_>,
+    evaluator: &mut Evaluator,
+) -> (f64, Vec<Place>) {
+    let index = |place: &Place| map.iter().position(|other| other == place).unwrap_or(0);
+    let mut at: Vec<usize> = start.iter().map(index).collect();
+    let grasp = |at: &[usize]| at.iter().map(|&k| map[k]).collect::<Vec<_>>();
+    let mut best = wanted.quality(evaluator, &grasp(&at));
+    if !wanted.cone.is_uniform() {
+        // Which finger goes where.
+        for order in permutations(at.len()) {
+            let other: Vec<_> = order.iter().map(|&k| at[k]).collect();
+            let quality = wanted.quality(evaluator, &grasp(&other));
+            if quality > best {
+                (best, at) = (quality, other);
+            }
+        }
+    }
+    loop {
+        let mut step = None;
+        for finger in 0..at.len() {
+            for &k in &neighbours[at[finger]] {
+                let mut trial = at.clone();
+                trial[finger] = k;
+                let places = grasp(&trial);
+                let Some(quality) = wanted.better(evaluator, &places, best) else {
+                    continue;
+                };
+                if others.iter().all(|other| wanted.differ(&places, other)) {
+                    best = quality;
+                    step = Some(trial);
+                }
+            }
+        }
+        match step {
+            Some(trial) => at = trial,
+            None => return (best, grasp(&at)),
+        }
+    }
+}
+
+/// All orders of up to four fingers; of more, all turns.
+fn permutations(count: usize) -> Vec<Vec<usize>> {
+    if count > 4 {
+        return (0..count)
+            .map(|turn| (0..count).map(|k| (k + turn) % count).collect())
+            .collect();
+    }
+    let mut all = vec![vec![]];
+    for _ in 0..count {
+        all = all
+            .iter()
+            .flat_map(|order: &Vec<usize>| {
+                (0..count)
+                    .filter(|k| !order.contains(k))
+                    .map(|k| [order.as_slice(), &[k]].concat())
+            })
+            .collect();
+    }
+    all
+}
+
+/// The candidates polished, as far as they are true and differ; and where these are too few, some
+/// as they were.
+fn checked(
+    mesh: &Mesh,
+    tip: &Tip,
+    candidates: &[Vec<Place>],
+    limit: f64,
+    wanted: &Wanted<'_>,
+    stop: &AtomicBool,
+) -> Result<Vec<Found>, Error> {
+    let mut kept: Vec<Found> = Vec::new();
+    for rounds in [polish::ROUNDS, 0] {
+        let found: Vec<_> = candidates
+            .par_iter()
+            .map(|grasp| {
+                if stop.load(Ordering::Relaxed) {
+                    return None;
+                }
+                climbed(mesh, tip, grasp, limit, rounds, wanted)
+            })
+            .collect();
+        if stop.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted);
+        }
+        let mut found: Vec<_> = found.into_iter().flatten().collect();
+        found.sort_by(|a, b| b.quality.total_cmp(&a.quality));
+        for grasp in found {
+            let mut others = kept.iter();
+            if others.all(|other| wanted.differ(&grasp.places, &other.places)) {
+                kept.push(grasp);
+            }
+        }
+        if kept.len() >= wanted.top {
+            break;
+        }
+    }
+    kept.sort_by(|a, b| b.quality.total_cmp(&a.quality));
+    // The first is one that bad aim does not lose, if there is any that is half as good.
+    let half = kept.first().map_or(0.0, |grasp| 0.5 * grasp.quality);
+    let sure = |grasp: &Found| grasp.checked.holds >= SURE && grasp.quality >= half;
+    if let Some(first) = kept.iter().position(sure) {
+        kept.drain(..first);
+    }
+    Ok(kept)
+}
+
+/// A grasp after some rounds of polishing, or as it is if only that is true; `None` if neither is.
+pub fn climbed(
+    mesh: &Mesh,
+    tip: &Tip,
+    grasp: &[Place],
+    limit: f64,
+    rounds: usize,
+    wanted: &Wanted<'_>,
+) -> Option<Found> {
+    let mut evaluator = Evaluator::new(wanted.cone);
+    let polished = polish(mesh, tip, grasp, limit, rounds, wanted, &mut evaluator);
+    [polished, grasp.to_vec()].into_iter().find_map(|places| {
+        let quality = wanted.quality(&mut evaluator, &places);
+        let checked = gate::check(mesh, tip, &places, quality, wanted, &mut evaluator)?;
+        Some(Found {
+            places,
+            quality,
+            checked,
+        })
+    })
+}

@@ -1,0 +1,1 @@
+"""Real objects: things in the world, as meshes or clouds of points."""

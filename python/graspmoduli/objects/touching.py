@@ -1,0 +1,329 @@
+"""Fingertips pressed on the mesh of a real object: where they may press, and the best grasps there.
+
+The kernels are in ``crates/graspmoduli/src/touch``; they see the mesh at size 1 about the origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._arrays import Floats, cores, count, locked, number
+from .._batches import Cone
+from .._core import GraspModuliError
+from .._values import Value
+from ..reading import Object, read
+
+#: The radius of a fingertip over the size of the object, if none is given.
+TIP = 0.05
+#: Tips larger than this, over the object's size, touch an object rather than a place on it.
+LARGEST_TIP, SMALLEST_TIP = 0.25, 1e-4
+#: Samples of a mesh at which tips are pressed.
+SAMPLES = 1_000
+#: Of any two grasps at least one contact differs by this share of the object's radius.
+APART = 0.15
+#: Rows of the kernels: a place's point, normal, share of the pad that is off, that bears, steady.
+POINT, NORMAL, OFF, BEARING, STEADY = slice(0, 3), slice(3, 6), 6, 7, 8
+
+
+class Shape(NamedTuple):
+    """Where the middle of a mesh's mass is, and whether that is known."""
+
+    center_of_mass: Floats
+    #: Is the mesh closed, and the centre that of the solid? Else it is that of the surface.
+    closed: bool
+
+
+class TriangleMesh:
+    """The triangles of an object in its own coordinates, to be touched from outside.
+
+    Parameters
+    ----------
+    vertices
+        Shape (n, 3).
+    faces
+        Shape (k, 3).
+    size
+        The object's largest extent.
+    """
+
+    def __init__(self, vertices: Floats, faces: NDArray[np.int64], size: float) -> None:
+        self.vertices = locked(np.ascontiguousarray(vertices, dtype=np.float64).copy())
+        self.faces = np.ascontiguousarray(faces, dtype=np.int64).copy()
+        self.faces.setflags(write=False)
+        self.size = float(size)
+        self.middle = locked((self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2)
+
+    @classmethod
+    def of(cls, thing: Object) -> TriangleMesh | None:
+        """The mesh of an object that has been read, if it has one."""
+        return None if thing.faces is None else cls(thing.points, thing.faces, thing.size)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return TriangleMesh, (self.vertices, self.faces, self.size)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, TriangleMesh):
+            return NotImplemented
+        return (
+            self.size == other.size
+            and np.array_equal(self.vertices, other.vertices)
+            and np.array_equal(self.faces, other.faces)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.size, (self.vertices + 0.0).tobytes(), self.faces.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"TriangleMesh({len(self.faces)} triangles, size {self.size:.4g})"
+
+    @cached_property
+    def core(self) -> _core.Mesh:
+        """The mesh as the kernels see it."""
+        return _core.Mesh(self.local(self.vertices), self.faces)
+
+    def local(self, points: Floats) -> Floats:
+        """Points in the kernels' coordinates."""
+        return np.ascontiguousarray((points - self.middle) / self.size)
+
+    def back(self, points: Floats) -> Floats:
+        """Points in the object's own coordinates."""
+        return self.middle + self.size * points
+
+    @cached_property
+    def shape(self) -> Shape:
+        """Centre of mass: of the solid, its density uniform, if the mesh is closed."""
+        corners = self.local(self.vertices)[self.faces]
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        across = np.cross(b - a, c - a)
+        volumes = (a * np.cross(b, c)).sum(axis=1)
+        volume = float(volumes.sum())
+        if _is_closed(self.vertices, self.faces) and abs(volume) > 1e-6:
+            center = ((a + b + c) * volumes[:, None]).sum(axis=0) / (4.0 * volume)
+            # Of parts that are wound against each other the sum is no centre.
+            if (np.abs(center) <= 0.5 * np.ptp(corners, axis=(0, 1))).all():
+                return Shape(locked(self.back(center)), True)
+        area = np.sqrt((across * across).sum(axis=1))
+        center = ((a + b + c) * area[:, None]).sum(axis=0) / (3.0 * area.sum())
+        return Shape(locked(self.back(center)), False)
+
+    @cached_property
+    def radius(self) -> float:
+        """The largest distance of a vertex from the centre of mass."""
+        away = self.vertices - self.shape.center_of_mass
+        return float(np.sqrt((away * away).sum(axis=1).max()))
+
+
+def _is_closed(vertices: Floats, faces: NDArray[np.int64]) -> bool:
+    """Has every edge two triangles, which run through it in opposite directions?
+
+    Corners in the same place are the same, as in files that repeat them.
+    """
+    order = np.lexsort(vertices.T)
+    new = np.append(False, (np.diff(vertices[order], axis=0) != 0.0).any(axis=1))
+    number = np.empty(len(vertices), dtype=np.int64)
+    number[order] = np.cumsum(new)
+    merged = number[faces]
+    one, other = merged.ravel(), merged[:, [1, 2, 0]].ravel()
+    degenerate = one == other
+    one, other = one[~degenerate], other[~degenerate]
+    forth = np.sort(one * len(vertices) + other)
+    back = np.sort(other * len(vertices) + one)
+    return bool(np.array_equal(forth, back))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMap(Value):
+    """Where fingertips may press on an object, in its own coordinates.
+
+    Any of these contacts may be combined: ``gm.quality(map.contacts[k], map.normals[k], z)``.
+    """
+
+    #: Where the middle of the tip touches. Shape (n, 3).
+    contacts: Floats
+    #: The normals that the tip feels, into the object, along which it comes. Shape (n, 3).
+    normals: Floats
+    #: Share of what lies under the pad whose normal is within 30° of the one felt. Shape (n,).
+    flatness: Floats
+    #: Share of the whole pad that bears: it lies on the object and is within 30°. Shape (n,).
+    bearing: Floats
+    #: Does the tip touch, and like here, if it aims half a radius beside? Shape (n,).
+    steady: NDArray[np.bool_]
+    #: Radius of the tip, in the unit of the object.
+    tip_radius: float
+
+    def __len__(self) -> int:
+        return len(self.contacts)
+
+
+def contact_map(
+    mesh_or_path: Any, tip_radius: float | None = None, seed: int = 0, *, samples: int = SAMPLES
+) -> ContactMap:
+    """Where a fingertip may press on a mesh, all over it.
+
+    A tip, a ball, comes straight from outside. It touches what it meets first, on either side of a
+    triangle; it feels the mean of the normals under its pad, weighted by how deep it is pressed
+    there; it is turned to that twice. It may press where it is not stopped before its middle
+    touches and the normal that it feels is within 20° of the way it comes, and, unless fewer than
+    30 such places are found, where it also touches if it aims half a radius beside.
+
+    Parameters
+    ----------
+    mesh_or_path
+        As for :func:`graspmoduli.fit`, with faces.
+    tip_radius
+        In the unit of the object; 5 % of its size if not given.
+    seed
+        Of the samples, which are spread evenly over the area.
+    samples
+        How many there are. Places that no tip reaches are left out.
+
+    Returns
+    -------
+    ContactMap
+        The same bits for any number of threads.
+
+    Raises
+    ------
+    GraspModuliError
+        If the object cannot be read or has no faces.
+    """
+    if isinstance(mesh_or_path, TriangleMesh):
+        mesh = mesh_or_path
+    else:
+        found = TriangleMesh.of(read(mesh_or_path))
+        if found is None:
+            raise GraspModuliError("mesh_or_path must have faces, got points only")
+        mesh = found
+    radius = tip(mesh, tip_radius)
+    start = count("seed", seed, 0)
+    rows = places(mesh, radius, start, count("samples", samples, 1, 10_000_000))
+    return ContactMap(
+        contacts=locked(mesh.back(rows[:, POINT])),
+        normals=locked(rows[:, NORMAL].copy()),
+        flatness=locked(1.0 - rows[:, OFF]),
+        bearing=locked(rows[:, BEARING].copy()),
+        steady=rows[:, STEADY] > 0.0,
+        tip_radius=radius * mesh.size,
+    )
+
+
+def tip(mesh: TriangleMesh, tip_radius: float | None) -> float:
+    """The radius of a tip over the object's size."""
+    if tip_radius is None:
+        return TIP
+    radius = number("tip_radius", tip_radius, positive=True) / mesh.size
+    if not SMALLEST_TIP <= radius <= LARGEST_TIP:
+        raise GraspModuliError(
+            f"tip_radius must be from {SMALLEST_TIP * mesh.size:.3g} to "
+            f"{LARGEST_TIP * mesh.size:.3g} for an object of size {mesh.size:.4g}, "
+            f"got {tip_radius:g}"
+        )
+    return radius
+
+
+def places(mesh: TriangleMesh, radius: float, seed: int, samples: int = SAMPLES) -> Floats:
+    """Rows of places, see :data:`POINT`, in the kernels' coordinates. Shape (n, 9)."""
+    random = np.random.Generator(np.random.Philox(seed))
+    return mesh.core.map(radius, random.random((samples, 3)))
+
+
+class Pressed(NamedTuple):
+    """A grasp found on a mesh, in the object's own coordinates, and what the mesh says of it."""
+
+    contacts: Floats
+    normals: Floats
+    checks: tuple[ContactCheck, ...]
+    #: Q_l with the normals of the triangles where the contacts are.
+    exact_quality: float
+    #: Share of errors of aim under which the grasp is force closure.
+    held: float
+    #: Q_l that nine of ten of these reach.
+    low_quality: float
+
+
+@dataclass(frozen=True)
+class ContactCheck:
+    """What the mesh says of a contact of a grasp."""
+
+    #: From the nearest point of the object, in its unit.
+    distance: float
+    #: Between the normal felt and that of the triangle at the contact [rad].
+    angle: float
+    #: Was the object seen there? Of a mesh, everywhere.
+    seen: bool
+    #: Radius, in the object's unit, about the way of the finger within which nothing stands in it:
+    #: up to four tip radii are looked at.
+    clearance: float
+    #: Share of the pad that bears.
+    bearing: float
+
+
+class Search(NamedTuple):
+    """What grasps are looked for."""
+
+    hand: Cone
+    #: Centre of mass and length scale, in the object's unit.
+    center_of_mass: Floats
+    length_scale: float
+    contacts: int
+    top: int
+    #: Errors of aim, in the object's unit.
+    errors: float
+
+
+def search(mesh: TriangleMesh, radius: float, seed: int, wanted: Search) -> list[Pressed]:
+    """Different grasps of the mesh, true ones by exact normals, by balls and under bad aim."""
+    rows = places(mesh, radius, seed)
+    found = mesh.core.grasps(radius, rows, _request(mesh, wanted), cores())
+    return [_pressed(mesh, one) for one in found]
+
+
+def press(
+    mesh: TriangleMesh, radius: float, contacts: Floats, normals: Floats, wanted: Search
+) -> Pressed | None:
+    """A grasp pressed on the mesh near given contacts and climbed there; None if it is lost."""
+    ways = np.ascontiguousarray(normals)
+    aims = mesh.local(contacts)
+    near = mesh.core.nearest(aims)
+    rows = mesh.core.settle(radius, near, ways)
+    if np.isnan(rows).any():
+        return None
+    found = mesh.core.climb(radius, rows, _request(mesh, wanted))
+    return None if found is None else _pressed(mesh, found)
+
+
+def _request(mesh: TriangleMesh, wanted: Search) -> Any:
+    x, y, z = mesh.local(wanted.center_of_mass).tolist()
+    mu, edges, torsion = wanted.hand
+    return (
+        # Torsion is a length: the kernels divide lengths by the length scale.
+        (mu, edges, torsion / wanted.length_scale),
+        (x, y, z),
+        mesh.size / wanted.length_scale,
+        wanted.contacts,
+        wanted.top,
+        APART * wanted.length_scale / mesh.size,
+        wanted.errors / mesh.size,
+    )
+
+
+def _pressed(mesh: TriangleMesh, found: tuple[Floats, list[float], Floats]) -> Pressed:
+    rows, (_, exact, _, held, low), contacts = found
+    checks = tuple(
+        ContactCheck(
+            distance=float(distance * mesh.size),
+            angle=float(np.arccos(min(1.0, cosine))),
+            seen=True,
+            clearance=float(clearance * mesh.size),
+            bearing=float(bearing),
+        )
+        for (distance, cosine, clearance), bearing in zip(contacts, rows[:, BEARING], strict=True)
+    )
+    normals = np.ascontiguousarray(rows[:, NORMAL])
+    return Pressed(mesh.back(rows[:, POINT]), normals, checks, exact, held, low)
