@@ -308,6 +308,19 @@ class Fit(Value):
         normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
         return self._object_grasp(grasp, contacts, normals, hand, center)
 
+    def on_surface(self, grasp: ObjectGrasp) -> Grasp:
+        """The grasp's place in G^cyl: contact coordinates of its contacts on the fitted surface.
+
+        Of contacts that are not on it, those of the nearest points of the surface.
+        """
+        if not isinstance(grasp, ObjectGrasp):
+            raise GraspModuliError(f"grasp must be an ObjectGrasp, got {brief(grasp)}")
+        if grasp.grasp is not None:
+            return grasp.grasp
+        local = (grasp.contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
+        u, theta, _ = self.surface.coordinates(local)
+        return Grasp(u, theta)
+
     def on_mesh(
         self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
     ) -> ObjectGrasp:
@@ -350,7 +363,7 @@ class Fit(Value):
     def transfer_to(
         self,
         target: Fit,
-        grasp: Grasp,
+        grasp: Grasp | ObjectGrasp,
         method: str = "ascent",
         *,
         friction: ArrayLike = 1.0,
@@ -366,6 +379,8 @@ class Fit(Value):
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
+        if isinstance(grasp, ObjectGrasp):
+            grasp = self.on_surface(grasp)
         start, end = self.unit_surface, target.unit_surface
         allowed = target.allowed if method == "ascent" else None
         carried = transfer(
