@@ -35,7 +35,7 @@ def test_linked_files_exist():
             assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.py")), ids=lambda p: p.stem)
 def test_examples_run(path, tmp_path):
     result = subprocess.run(
         [sys.executable, path], cwd=tmp_path, capture_output=True, text=True, check=False

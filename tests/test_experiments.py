@@ -571,6 +571,7 @@ def undisturbed(tmp_path_factory):
     return (folder / "results.json").read_bytes()
 
 
+@pytest.mark.long
 def test_a_run_that_is_killed_goes_on(undisturbed, tmp_path):
     # Killed when it has so many pieces, whatever time that takes; the last one runs to its end.
     folder = tmp_path / "run"
@@ -604,6 +605,7 @@ def test_a_run_killed_at_any_moment_goes_on(undisturbed, tmp_path):
     assert (folder / "results.json").read_bytes() == undisturbed
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX's")
 def test_a_full_disk_is_one_sentence_and_loses_nothing(undisturbed, tmp_path):
     folder = tmp_path / "run"

@@ -64,7 +64,7 @@ class TestNumbers:
 @pytest.mark.parametrize("edges", [4, 8, 13])
 def test_values_agree_with_qhull(uniform, friction, edges):
     q = gm.quality(*uniform, friction=friction, edges=edges)
-    chosen = [*np.flatnonzero(q > 0)[:250], *range(60)]
+    chosen = [*np.flatnonzero(q > 0)[:120], *range(40)]
     for i in chosen:
         contacts, normals, center = (array[i] for array in uniform)
         wanted = reference.quality(contacts, normals, center, friction, edges)
@@ -74,9 +74,9 @@ def test_values_agree_with_qhull(uniform, friction, edges):
 @pytest.mark.parametrize("m", [4, 5, 8])
 @pytest.mark.parametrize("edges", [3, 8, 13])
 def test_values_of_more_contacts_agree_with_qhull(m, edges):
-    grasps = uniform_grasps(60, np.random.default_rng(m), m)
+    grasps = uniform_grasps(30, np.random.default_rng(m), m)
     q = gm.quality(*grasps, friction=0.7, edges=edges)
-    assert (q > 0).sum() > 5
+    assert (q > 0).sum() > 2
     for value, contacts, normals, center in zip(q, *grasps, strict=True):
         wanted = reference.quality(contacts, normals, center, 0.7, edges)
         assert value == pytest.approx(max(wanted, 0.0), abs=1e-9)
@@ -102,6 +102,15 @@ class TestRelatives:
         total, each = gm.quality(*grasps), gm.quality(*grasps, norm="each")
         assert (each >= total - 1e-12).all()
         assert (each <= 3 * total + 1e-9).all()
+        stable = [part[each > 0.0] for part in grasps]
+        q = each[each > 0.0]
+        for bar in (0.1, q.max(), np.nextafter(q.max(), 1.0)):
+            at_least = gm.quality_at_least(*stable, bar, norm="each")
+            np.testing.assert_array_equal(at_least, q >= bar)
+        best = gm.largest_quality(*stable, norm="each")
+        worst = gm.smallest_quality(*stable, norm="each")
+        assert (best.index, best.quality) == ((q.argmax(),), q.max())
+        assert (worst.index, worst.quality) == ((q.argmin(),), q.min())
 
     def test_soft_fingers_join_two_wrenches_each(self):
         contacts, normals, centers = uniform_grasps(60, np.random.default_rng(22))

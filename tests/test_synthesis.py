@@ -273,3 +273,38 @@ class TestSynthesis:
             gm.synthesize(gm.shapes.MODELS["a"], allowed=[True])
         with pytest.raises(gm.GraspModuliError, match="top must be at least 1"):
             gm.synthesize(gm.shapes.MODELS["a"], top=0)
+
+
+class TestSoftFingers:
+    """Best subsets of soft contacts, and what is carried of them."""
+
+    @pytest.mark.parametrize("m", [2, 3, 4])
+    def test_equal_evaluating_every_subset(self, m):
+        box = gm.shapes.model("box")
+        u, theta = gm.sample_points(box, 14, seed=3)
+        subsets = np.array(list(itertools.combinations(range(14), m)))
+        contacts, normals = box.points(u, theta)[subsets], box.normals(u, theta)[subsets]
+        hand = {"friction": 0.6, "torsion": 0.15}
+        q = gm.quality(contacts, normals, box.center_of_mass, **hand)
+        order = np.argsort(-q, kind="stable")[:3]
+        found = gm.best_grasps(box, u, theta, contacts=m, top=3, **hand)
+        assert [grasp.quality for grasp in found] == q[order].tolist()
+        assert q[order[0]] > 0.0
+        for grasp, row in zip(found, subsets[order], strict=True):
+            np.testing.assert_array_equal(grasp.grasp.u, u[row])
+            assert gm.quality(grasp) == grasp.quality
+            assert gm.quality(grasp, torsion=0.0) < grasp.quality
+
+    def test_two_soft_fingers_are_carried_by_what_they_can_do(self):
+        can = gm.Surface.revolution(lambda u: 0.4 + 0.0 * u, -0.3, 0.3)
+        wide = 1.2 * can
+        jaw = gm.Grasp([0.5, 0.5], [0.0, np.pi])
+        for method in ("naive", "gradient"):
+            end = gm.transfer(can, jaw, wide, method, torsion=0.1, surfaces=10)
+            assert (
+                end.quality == gm.quality(end) == gm.quality(gm.place(wide, end.grasp), torsion=0.1)
+            )
+            assert end.quality > 0.0
+            assert gm.transfer(can, jaw, wide, method, surfaces=10).quality == 0.0
+        with pytest.raises(gm.GraspModuliError, match="for hard fingers, got torsion"):
+            gm.transfer(can, gm.Grasp([0.5] * 3, [0, 2, 4]), wide, "ascent", torsion=0.1)

@@ -100,6 +100,17 @@ def test_numbers_for_comparison():
     assert repr(space) == "WrenchSpace(3 contacts, Q_8 = 0.544232)"
 
 
+def test_what_was_computed_stays_true():
+    contacts, normals, centers = uniform_grasps(2, np.random.default_rng(54))
+    space = gm.WrenchSpace(contacts[0], normals[0], centers[0])
+    with pytest.raises(AttributeError, match="make another one, with its friction"):
+        space.friction = np.full(3, 0.1)
+    with pytest.raises(ValueError, match="read-only"):
+        space.friction[0] = 0.1
+    with pytest.raises(ValueError, match="read-only"):
+        gm.quality_gradient(contacts, normals, centers).value[0] = 1.0
+
+
 def test_wrong_input():
     with pytest.raises(gm.GraspModuliError, match="one grasp, of shape"):
         gm.WrenchSpace([CIRCLE], [-CIRCLE], ORIGIN)

@@ -181,12 +181,12 @@ def frictions_of(friction: ArrayLike | None, m: int, *, positive: bool = False) 
     return mu
 
 
-def fingers(friction: ArrayLike, edges: Any, m: int) -> Cone:
+def fingers(friction: ArrayLike, edges: Any, m: int, torsion: Any = 0.0) -> Cone:
     """The cones of a hand that looks for a grasp: friction positive, a number or one per finger."""
     mu = frictions_of(friction, m, positive=True)
     if mu.ndim != 1:
         raise GraspModuliError(f"friction must be a number or have shape ({m},), got {mu.shape}")
-    return mu.tolist(), edges_of(edges), 0.0
+    return mu.tolist(), edges_of(edges), coefficient("torsion", torsion)
 
 
 def carried(cone: Cone) -> float | tuple[float, ...]:

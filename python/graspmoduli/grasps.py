@@ -148,6 +148,8 @@ class RankedGrasp(PlacedGrasp):
     edges: int
     #: Torques are divided by it for the quality.
     length_scale: float
+    #: Torsional friction of soft fingers, a length; 0 for hard ones.
+    torsion: float = field(default=0.0, kw_only=True)
 
 
 @overload
@@ -158,6 +160,16 @@ def place(surface: Surface | Sequence[Surface], grasp: Grasp) -> PlacedGrasp | l
     """The grasp's contacts and normals on a surface, with the surface's centre of mass z_S.
 
     On a list of surfaces: a list, the same grasp on each.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> grasp = gm.Grasp([0.2, 0.4, 0.6], [0.0, 2.0, 4.0])
+    >>> bottle, vase = gm.shapes.model("bottle"), gm.shapes.model("vase")
+    >>> gm.place(bottle, grasp).contacts.shape
+    (3, 3)
+    >>> gm.quality(gm.place([bottle, vase], grasp)).shape
+    (2,)
     """
     if isinstance(surface, list | tuple):
         return [place(one, grasp) for one in surface]
@@ -220,6 +232,14 @@ def grasp_gradient(
         As in :func:`graspmoduli.quality`.
     center_of_mass
         Shape (3,); the surface's own z_S if not given. It stays where it is.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle = gm.shapes.model("bottle")
+    >>> slope = gm.grasp_gradient(bottle, gm.Grasp([0.2, 0.4, 0.6], [0.0, 2.0, 4.0]))
+    >>> slope.u.shape, slope.theta.shape
+    ((3,), (3,))
     """
     placed = place(a_surface("surface", surface), grasp)
     slope = quality_gradient(

@@ -38,6 +38,13 @@ def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int =
     -------
     float
         0 if the grasp is not force closure even with the inscribed cones.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> best = gm.synthesize(gm.shapes.model("bottle"), top=1)[0]
+    >>> 0.05 < gm.certified_radius(best) < 0.2
+    True
     """
     if not isinstance(placed, PlacedGrasp):
         raise GraspModuliError(f"placed must be a PlacedGrasp, got {_what(placed)}")
@@ -94,6 +101,14 @@ def certify_transfer(
         The surface S, a grasp on it, the surface T.
     friction, edges
         As in :func:`graspmoduli.quality`, positive.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle = gm.shapes.model("bottle")
+    >>> best = gm.synthesize(bottle, top=1)[0]
+    >>> gm.certify_transfer(bottle, best.grasp, 1.05 * bottle).certified
+    True
     """
     if not isinstance(grasp, Grasp):
         raise GraspModuliError(f"grasp must be a Grasp, got {_what(grasp)}")
@@ -114,10 +129,17 @@ def transfer_bound(source: Surface, target: Surface) -> float:
     the centre of mass too, which can move further (docs/mathematics.md has surfaces with which it
     does). The bound here is the larger of d(S, T), with its error, and ‖z_S − z_T‖, z as in
     :attr:`Surface.center_of_mass`.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle = gm.shapes.model("bottle")
+    >>> gm.transfer_bound(bottle, 1.01 * bottle) < 0.02
+    True
     """
     apart = surface_distance(a_surface("source", source), a_surface("target", target))
-    moved = np.linalg.norm(source.center_of_mass - target.center_of_mass)
+    moved = np.linalg.norm([source.center_of_mass - target.center_of_mass], axis=1)[0]
     # Rounding of the points and normals that a grasp is placed with.
     extent = max(np.abs([s.bottom, s.top]).max() + s.coefficients.max() for s in (source, target))
     rounding = 1e-12 * max(apart, float(moved)) + (4e-15 * extent if apart > 0.0 else 0.0)
-    return max(apart + apart.error, float(moved)) + rounding
+    return float(max(apart + apart.error, float(moved)) + rounding)

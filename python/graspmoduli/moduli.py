@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, brief, count, floats, locked, number
-from ._core import GraspModuliError
+from ._core import GraspModuliError, sin
 from .grasps import Grasp, PlacedGrasp
 from .surfaces import Surface, _what, a_surface, combine, some_surfaces
 
@@ -61,6 +61,12 @@ def sample_weights(
     -------
     array of shape (n, surfaces)
         Rows are not negative and sum to 1 if no ``total`` is given, to rounding.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> gm.sample_weights(3, 1000, seed=0).mean(axis=0).round(1)
+    array([0.3, 0.3, 0.3])
     """
     k = count("surfaces", surfaces, 1)
     alpha = floats("concentration", concentration)
@@ -100,6 +106,22 @@ def sample_combinations(
 
     A list of ``n`` surfaces, with the weights of :func:`sample_weights` that they were made with
     as its ``weights``. Parameters are those of that function.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> corners = [gm.shapes.model(name) for name in ("bottle", "vase", "pear")]
+    >>> shapes = gm.sample_combinations(corners, 5, seed=0)
+    >>> len(shapes), shapes.weights.shape
+    (5, (5, 3))
+    >>> shapes[0] == gm.combine(corners, shapes.weights[0])
+    True
+
+    With ``total`` they are drawn from Cone(X), here between a half and twice the size:
+
+    >>> larger = gm.sample_combinations(corners, 5, seed=0, total=(0.5, 2.0))
+    >>> bool((larger.weights.sum(axis=1) <= 2.0).all())
+    True
     """
     given = some_surfaces("surfaces", surfaces)
     weights = sample_weights(len(given), n, seed, concentration, total=total)
@@ -126,6 +148,17 @@ def interpolate(start: Point, end: Point, t: ArrayLike) -> Point | list[Point]:
     Returns
     -------
     (Surface, Grasp), or a list of k for several t
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> start = gm.shapes.model("bottle"), gm.Grasp([0.2, 0.4, 0.6], [0.0, 2.0, 4.0])
+    >>> end = gm.shapes.model("vase"), gm.Grasp([0.3, 0.5, 0.7], [6.0, 2.0, 4.0])
+    >>> surface, grasp = gm.interpolate(start, end, 0.5)
+    >>> grasp.u  # θ of the first turns the shorter way, through 2π
+    array([0.25, 0.45, 0.65])
+    >>> len(gm.interpolate(start, end, [0.0, 0.25, 0.5, 0.75, 1.0]))
+    5
     """
     (first, g), (last, h) = a_point("start", start), a_point("end", end)
     shares = floats("t", t)
@@ -168,7 +201,16 @@ def shortest_turn(g: Grasp, h: Grasp) -> Floats:
 
 def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     """d(g, g') of Sec. III: the largest distance between corresponding contacts, normals and
-    centres of mass."""
+    centres of mass.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle, grasp = gm.shapes.model("bottle"), gm.Grasp([0.2, 0.4, 0.6], [0.0, 2.0, 4.0])
+    >>> placed = gm.place(bottle, grasp)
+    >>> gm.placed_distance(placed, placed)
+    0.0
+    """
     for name, value in (("p", p), ("q", q)):
         if not isinstance(value, PlacedGrasp):
             raise GraspModuliError(f"{name} must be a PlacedGrasp, got {_what(value)}")
@@ -176,7 +218,7 @@ def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     return max(
         float(np.linalg.norm(p.contacts - q.contacts, axis=1).max()),
         float(np.linalg.norm(p.normals - q.normals, axis=1).max()),
-        float(np.linalg.norm(p.center_of_mass - q.center_of_mass)),
+        float(np.linalg.norm([p.center_of_mass - q.center_of_mass], axis=1)[0]),
     )
 
 
@@ -243,6 +285,14 @@ def surface_distance(
     of a million cells cannot tell the supremum so well, as for surfaces a thousand times flatter
     than wide, where it can be many times the value, and where rounding does not allow it, as for
     surfaces that are equal but for their last digits.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle = gm.shapes.model("bottle")
+    >>> d = gm.surface_distance(bottle, 3 * bottle)
+    >>> round(d, 4), d.error < 1e-6
+    (1.8462, True)
     """
     wanted = number("tolerance", tolerance)
     if not 1e-9 <= wanted <= 1.0:
@@ -262,12 +312,21 @@ def distance(start: Point, end: Point, *, angles: str = "chord") -> Distance:
     A number with a proven ``error``: that of :func:`surface_distance`, and rounding. ``start`` and
     ``end`` are pairs ``(surface, grasp)``; ``angles`` are measured by their ``"chord"``, as in the
     paper, or by their ``"arc"``.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle, vase = gm.shapes.model("bottle"), gm.shapes.model("vase")
+    >>> grasp = gm.Grasp([0.2, 0.4, 0.6], [0.0, 2.0, 4.0])
+    >>> d = gm.distance((bottle, grasp), (vase, grasp))
+    >>> d == gm.surface_distance(bottle, vase), d.error < 1e-6
+    (True, True)
     """
     if not isinstance(angles, str) or angles not in ANGLES:
         raise GraspModuliError(f'angles must be "chord" or "arc", got {brief(angles)}')
     (first, g), (last, h) = a_point("start", start), a_point("end", end)
     arc = np.abs(shortest_turn(g, h))
-    apart = arc if angles == "arc" else 2.0 * np.sin(0.5 * arc)
+    apart = arc if angles == "arc" else 2.0 * sin(0.5 * arc)
     rest = float(np.abs(g.u - h.u).sum() + apart.sum())
     surfaces = surface_distance(first, last)
     return Distance(surfaces + rest, surfaces.error + 1e-15 * len(g) * rest)

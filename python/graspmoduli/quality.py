@@ -141,10 +141,9 @@ def quality(
     )
     if value is not None:
         return value
-    if not isinstance(norm, str) or norm not in NORMS:
-        raise GraspModuliError(f'norm must be "sum" or "each", got {brief(norm)}')
+    each = _is_each(norm)
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
-    return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, norm == "each"))
+    return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, each))
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,15 +182,24 @@ def quality_gradient(
     derivatives are 0, which is the gradient inside of the set {Q = 0} and an element of the
     generalised one on its boundary. Where a normal is −e₃ the contact frame is not continuous, and
     the motion of its tangents is left out.
+
+    Examples
+    --------
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> slope = gm.quality_gradient(circle, -circle, [0, 0, 0])
+    >>> slope.contacts.shape, slope.center_of_mass.shape
+    ((3, 3), (3,))
     """
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
     m, shape = grasps.arrays[0].shape[1], grasps.shape
     rows = _core.quality_gradient(grasps.arrays, grasps.cone)
-    value, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
+    found, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
     # The kernel's derivatives are by lengths over the length scale.
     scale = grasps.scale[..., None]
     return QualityGradient(
-        value=grasps.shaped(value[:, 0].copy()),
+        value=grasps.shaped(locked(found[:, 0].copy())),
         contacts=locked((by_contact / scale).reshape((*shape, m, 3))),
         normals=locked(by_normal.reshape((*shape, m, 3))),
         center_of_mass=locked((by_center / scale).reshape((*shape, 3))),
@@ -207,15 +215,27 @@ def quality_at_least(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
+    norm: str = "sum",
     length_scale: ArrayLike | None = None,
 ) -> Any:
     """Is Q_l ≥ ``threshold``?
 
     The same as comparing :func:`quality`, whose arguments and errors it shares, but each grasp is
-    given up as soon as the answer is known. A bool for a single grasp, else shape (...).
+    given up as soon as the answer is known (with ``norm="sum"``). A bool for a single grasp, else
+    shape (...).
+
+    Examples
+    --------
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> gm.quality_at_least(circle, -circle, [0, 0, 0], 0.5)
+    True
     """
     bar = number("threshold", threshold)
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    if _is_each(norm):
+        return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, True) >= bar)
     return grasps.shaped(_core.quality_at_least(grasps.arrays, grasps.cone, bar))
 
 
@@ -237,16 +257,24 @@ def largest_quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
+    norm: str = "sum",
     length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The best of a batch of grasps by Q_l, the first among equals.
 
     The same as the maximum of :func:`quality`, whose arguments and errors it shares, but a grasp
-    is given up as soon as it is known to be worse than the best so far.
+    is given up as soon as it is known to be worse than the best so far (with ``norm="sum"``).
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> some = gm.sample_configurations(1000, seed=0)
+    >>> best = gm.largest_quality(some)
+    >>> bool(best.quality == gm.quality(some).max())
+    True
     """
-    return _extreme(
-        batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale), True
-    )
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    return _extreme(grasps, _is_each(norm), largest=True)
 
 
 def smallest_quality(
@@ -257,20 +285,37 @@ def smallest_quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
+    norm: str = "sum",
     length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The worst of a batch of grasps by Q_l, the first among equals.
 
     The same as the minimum of :func:`quality`, whose arguments and errors it shares, but a grasp
-    is given up as soon as it is known not to be worse than the worst so far.
+    is given up as soon as it is known not to be worse than the worst so far (with ``norm="sum"``).
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> gm.smallest_quality(gm.sample_configurations(1000, seed=0)).quality
+    0.0
     """
-    return _extreme(
-        batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale), False
-    )
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    return _extreme(grasps, _is_each(norm), largest=False)
 
 
-def _extreme(grasps: Batch, largest: bool) -> Extreme:
-    found = _core.extreme_quality(grasps.arrays, grasps.cone, largest)
+def _is_each(norm: Any) -> bool:
+    if not isinstance(norm, str) or norm not in NORMS:
+        raise GraspModuliError(f'norm must be "sum" or "each", got {brief(norm)}')
+    return norm == "each"
+
+
+def _extreme(grasps: Batch, each: bool, *, largest: bool) -> Extreme:
+    if each and len(grasps.arrays[2]):
+        values = _core.quality(grasps.arrays, grasps.cone, True)
+        first = int(values.argmax() if largest else values.argmin())
+        found = first, float(values[first])
+    else:
+        found = _core.extreme_quality(grasps.arrays, grasps.cone, largest)
     if found is None:
         raise GraspModuliError(
             f"contacts must hold at least one grasp, got a batch of shape {grasps.shape}"
@@ -318,6 +363,15 @@ def circular_quality(
     tolerance
         The bounds are driven to within this of each other, relative to the upper one; from 1e-6
         to 1. They may stay further apart where that takes more than four million facets.
+
+    Examples
+    --------
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> bounds = gm.circular_quality(circle, -circle, [0, 0, 0])
+    >>> gm.quality(circle, -circle, [0, 0, 0]) < bounds.lower <= bounds.upper
+    True
     """
     wanted = number("tolerance", tolerance)
     if not 1e-6 <= wanted <= 1.0:

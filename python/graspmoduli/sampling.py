@@ -23,6 +23,13 @@ def sample_points(surface: Surface, n: int, seed: int = 0) -> tuple[Floats, Floa
     -------
     u, theta
         Each of shape (n,), read-only. The same seed gives the same bits.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> u, theta = gm.sample_points(gm.shapes.model("bottle"), 200, seed=0)
+    >>> u.shape, theta.shape
+    ((200,), (200,))
     """
     core = a_surface("surface", surface)._core
     points = _core.sample_points(core, unit_square(count("n", n, 1), seed))

@@ -155,7 +155,7 @@ MODELS: Mapping[str, Surface] = _Models()
 def model(name: str) -> Surface:
     """A model surface by its letter or by what it looks like ("bottle")."""
     for letter, kind in NAMES.items():
-        if name in (letter, kind):
+        if isinstance(name, str) and name in (letter, kind):
             return _model(letter)
     known = ", ".join(f"{k} ({v})" for k, v in NAMES.items())
     raise GraspModuliError(f"name must be one of {known}, got {name!r}")

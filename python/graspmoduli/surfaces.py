@@ -85,6 +85,15 @@ class Surface:
             the (u, θ) rectangle. The grid is refined until it is met there; a warning says so if
             512 intervals are not enough. What lies between all of these points, such as a bump
             of less than a hundredth of the rectangle in both directions, is not seen.
+
+        Examples
+        --------
+        >>> import numpy as np, graspmoduli as gm
+        >>> screw = gm.Surface.from_function(
+        ...     lambda u, theta: 0.4 + 0.08 * np.cos(3 * theta - 2 * np.pi * u), -0.6, 0.6
+        ... )
+        >>> screw.is_revolution, abs(screw.radius(0.0, 0.0) - 0.48) < 1e-6
+        (False, True)
         """
         call = _caller(radius, 2, "u and theta", "for one of u alone there is Surface.revolution")
         return cls._interpolated(call, bottom, top, tolerance)
@@ -106,6 +115,13 @@ class Surface:
             ``radius(u)``, positive, for arrays.
         bottom, top, tolerance
             As in :meth:`from_function`.
+
+        Examples
+        --------
+        >>> import numpy as np, graspmoduli as gm
+        >>> gourd = gm.Surface.revolution(lambda u: 0.35 + 0.15 * np.cos(3 * np.pi * u), -0.7, 0.7)
+        >>> gourd.is_revolution, (gourd / 2.0).top
+        (True, 0.35)
         """
         call = _caller(radius, 1, "u", "for one of u and theta there is Surface.from_function")
         return cls._interpolated(lambda u, theta: call(u), bottom, top, tolerance)
@@ -474,6 +490,14 @@ def combine(surfaces: Sequence[Surface], weights: ArrayLike) -> Surface:
         n of them.
     weights
         One per surface. Shape (n,).
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> bottle, vase = gm.shapes.model("bottle"), gm.shapes.model("vase")
+    >>> shape = gm.combine([bottle, vase], [0.25, 0.75])
+    >>> round(0.25 * bottle.top + 0.75 * vase.top, 12) == round(shape.top, 12)
+    True
     """
     given = some_surfaces("surfaces", surfaces)
     values = floats("weights", weights)
@@ -510,6 +534,14 @@ def closest_combination(surface: Surface, surfaces: Sequence[Surface]) -> Floats
 
     Closest in the mean of ‖c_S(u, θ) − c_{S'}(u, θ)‖² over u and θ: a convex problem with one
     answer if the given ones are independent. Shape (n,), not negative, summing to 1.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> corners = [gm.shapes.model(name) for name in ("bottle", "vase", "pear")]
+    >>> between = gm.combine(corners, [0.5, 0.3, 0.2])
+    >>> gm.closest_combination(between, corners).round(6)
+    array([0.5, 0.3, 0.2])
     """
     from scipy.optimize import nnls
 
@@ -536,6 +568,12 @@ def project(surface: Surface) -> Surface:
     """π(S): the surface of revolution with the mean radius over θ (Sec. IV.E); exact.
 
     The way there is ``interpolate((S, g), (project(S), g), t)``, or ``transfer`` to it.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> gm.project(gm.shapes.model("box")).is_revolution
+    True
     """
     return Surface(a_surface("surface", surface)._core.project())
 

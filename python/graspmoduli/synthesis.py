@@ -33,6 +33,7 @@ def best_grasps(
     top: int = 1,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
     center_of_mass: ArrayLike | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -46,12 +47,15 @@ def best_grasps(
     u, theta
         Contact coordinates. Shape (n,).
     contacts
-        Contacts per grasp. Three are by far the fastest; fewer are never force closure.
+        Contacts per grasp. Three hard ones are by far the fastest; two hold as soft fingers only.
     top
         How many grasps to return. Fewer come back if fewer are force closure.
     friction, edges
         As in :func:`graspmoduli.quality`; friction positive, a number or one per given contact,
         (n,), such as where an object's parts differ.
+    torsion
+        As in :func:`graspmoduli.quality`: above 0 the fingers are soft, such as the two pads of a
+        parallel jaw.
     center_of_mass
         Shape (3,); the surface's own z_S if not given.
     threads
@@ -64,6 +68,19 @@ def best_grasps(
     list of RankedGrasp
         Best first, equal ones in the order of their contacts. The same as evaluating every
         subset: those that are left out are proven to be worse.
+
+    Examples
+    --------
+    The jaw of a gripper closes on two of sixty points of a bottle.
+
+    >>> import graspmoduli as gm
+    >>> bottle = gm.shapes.model("bottle")
+    >>> u, theta = gm.sample_points(bottle, 60, seed=1)
+    >>> jaw = gm.best_grasps(bottle, u, theta, contacts=2, torsion=0.1)[0]
+    >>> gm.quality(jaw) == jaw.quality > 0.0
+    True
+    >>> gm.best_grasps(bottle, u, theta, contacts=2)  # hard fingers cannot hold it
+    []
     """
     center = center_of(a_surface("surface", surface), center_of_mass)
     us, thetas, shape = coordinates(u, theta)
@@ -77,7 +94,7 @@ def best_grasps(
         raise GraspModuliError(
             f"friction must be a number or have shape ({us.size},), got {each.shape}"
         )
-    hand = fingers(each[0], edges, size)
+    hand = fingers(each[0], edges, size, torsion)
     top = count("top", top, 1, MOST_RANKED)
     workers = cores() if threads is None else count("threads", threads, 1, MOST_THREADS)
     a_callback("progress", progress)
@@ -95,7 +112,7 @@ def best_grasps(
     found = []
     for indices, _ in ranked:
         chosen = list(indices)
-        own = hand if each.size == 1 else (each[chosen].tolist(), hand[1], 0.0)
+        own = hand if each.size == 1 else (each[chosen].tolist(), *hand[1:])
         found.append(ranked_grasp(surface, Grasp(us[chosen], thetas[chosen]), center, own))
     return found
 
@@ -142,6 +159,13 @@ def synthesize(
     list of RankedGrasp
         Best first. Of any two grasps, in whatever order their contacts are compared, at least one
         contact differs by 15 % of the object's radius.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> best, *others = gm.synthesize(gm.shapes.model("pear"))
+    >>> gm.quality(best) == best.quality >= others[0].quality
+    True
     """
     hand = fingers(friction, edges, 3)
     center = center_of(a_surface("surface", surface), center_of_mass)
@@ -177,6 +201,12 @@ def plane_grasp(
     Returns
     -------
     RankedGrasp, or None if no triple is force closure
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> gm.plane_grasp(gm.shapes.model("glass"), heights=11).quality > 0.2
+    True
     """
     hand = fingers(friction, edges, 3)
     a_surface("surface", surface)
@@ -203,17 +233,20 @@ def ranked_grasp(
 ) -> RankedGrasp:
     """A grasp that was found, with its quality as every other function will see it."""
     placed = place(surface, grasp)
-    friction, edges = carried(hand), hand[1]
+    friction, edges, torsion = carried(hand), hand[1], hand[2]
     return RankedGrasp(
         contacts=placed.contacts,
         normals=placed.normals,
         center_of_mass=np.array(center),
         grasp=grasp,
         surface=surface,
-        quality=quality(placed, center_of_mass=center, friction=friction, edges=edges),
+        quality=quality(
+            placed, center_of_mass=center, friction=friction, edges=edges, torsion=torsion
+        ),
         friction=friction,
         edges=edges,
         length_scale=1.0,
+        torsion=torsion,
     )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from . import _core
 from ._arrays import Floats, brief, cells, count, locked, number
 from ._batches import Cone, carried, fingers
-from ._core import GraspModuliError
+from ._core import GraspModuliError, cos, sin
 from ._values import Value
 from .grasps import Grasp, RankedGrasp, a_grasp, a_point, a_surface, place
 from .moduli import Point, same_number, shortest_turn
@@ -63,6 +63,7 @@ def transfer(
     *,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -77,6 +78,7 @@ def transfer(
     *,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -92,6 +94,7 @@ def transfer(
     *,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -106,6 +109,7 @@ def transfer(
     *,
     friction: ArrayLike = 1.0,
     edges: int = 8,
+    torsion: float = 0.0,
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -130,6 +134,8 @@ def transfer(
         best of these.
     friction, edges
         As in :func:`graspmoduli.quality`; friction positive, a number or one per finger, (m,).
+    torsion
+        As in :func:`graspmoduli.quality`: soft fingers, which the ascent does not know.
     surfaces
         N₁; for the naïve transfer, how finely its quality is sampled.
     steps, step_length
@@ -151,6 +157,18 @@ def transfer(
     ------
     GraspModuliError
         If an argument is wrong, or ``allowed`` allows no contact at all.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> names = ("bottle", "glass", "vase")
+    >>> bottle, glass, vase = (gm.shapes.model(name) for name in names)
+    >>> best = gm.synthesize(bottle, top=1)[0]
+    >>> gm.transfer(bottle, best.grasp, glass).grasp == best.grasp  # keeps u and θ
+    True
+    >>> over_the_glass = gm.transfer(bottle, best.grasp, [glass, vase], "gradient")
+    >>> over_the_glass.quality > gm.transfer(bottle, best.grasp, vase).quality
+    True
     """
     if isinstance(source, tuple):
         method = method if target is None else target
@@ -171,9 +189,11 @@ def transfer(
     for other in grasps[1:]:
         same_number(grasps[0], other)
     m = len(grasps[0]) if grasps else 3
-    hand = fingers(friction, edges, m)
+    hand = fingers(friction, edges, m, torsion)
     if method == "ascent" and m != 3:
         raise GraspModuliError(f'method "ascent" is for grasps of three contacts, got {m}')
+    if method == "ascent" and hand[2] > 0.0:
+        raise GraspModuliError(f'method "ascent" is for hard fingers, got torsion {hand[2]:g}')
     region = cells(allowed)
     if region is not None and method != "ascent":
         raise GraspModuliError(f'allowed is for method "ascent", got method {method!r}')
@@ -371,7 +391,7 @@ def _by_line(
         )
         low, top = ((1.0 - share) * heights[0] + share * heights[1]).T
         height = (top - low)[:, None]
-        c, s = np.cos(theta), np.sin(theta)
+        c, s = cos(theta), sin(theta)
         contacts = np.stack([f * c, f * s, (1.0 - u) * low[:, None] + u * top[:, None]], axis=-1)
         # t₁ × t₂ / f, in the frame that turns with θ: (−H, H f_θ / f, f_u).
         radial, across = -height, height * ft / f
@@ -396,7 +416,7 @@ def _centers(first: Surface, last: Surface) -> Any:
 
     def nodes_of(size: int) -> list[float]:
         """Chebyshev's points with both ends; those of a finer set contain them."""
-        return [0.5 - 0.5 * float(np.cos(np.pi * k / (size - 1))) for k in range(size)]
+        return (0.5 - 0.5 * cos(np.pi * np.arange(size) / (size - 1))).tolist()
 
     size = 9
     while True:
@@ -415,7 +435,9 @@ def _centers(first: Surface, last: Surface) -> Any:
             shares = np.where(
                 hit.any(axis=1, keepdims=True), hit, weights / np.where(hit, 1.0, apart)
             )
-            return (shares @ values) / shares.sum(axis=1, keepdims=True)
+            # Not by BLAS, whose last bits depend on the processor.
+            total = (shares[..., None] * values).sum(axis=1)
+            return total / shares.sum(axis=1, keepdims=True)
 
         if size >= MOST_CENTERS:
             return center

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, floats, locked
-from ._batches import GraspLike, batch
+from ._batches import Batch, GraspLike, batch
 from ._core import GraspModuliError
 from ._values import Value, hashable, same
 from .equilibrium import BALANCED, least_sum
@@ -68,7 +68,46 @@ class WrenchSpace:
         As in :func:`graspmoduli.quality`. The length scale says how torques are weighed against
         forces: in ``quality`` and ``status``, in which wrench is the ``weakest``, and in the
         ``offsets`` of ``facets``. It does not matter to ``resist``.
+
+    Examples
+    --------
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> space = gm.WrenchSpace(circle, -circle, [0, 0, 0])
+    >>> space.status
+    'force closure'
+
+    The half-spaces {x: ⟨x, v_i⟩ ≤ λ_i} whose intersection is S(g) (Sec. II); the nearest of their
+    boundaries is Q_l away from the origin.
+
+    >>> print(round(space.facets.offsets.min(), 9), round(space.quality, 9))
+    0.544232187 0.544232187
+
+    Forces that hold a weight of 2, the sum of their normal parts, and what a push of 0.5 at a lever
+    of 0.1 asks for:
+
+    >>> bool(np.allclose(space.resist([0, 0, -2, 0, 0, 0]).forces.sum(axis=0), [0, 0, 2]))
+    True
+    >>> space.resist([0.5, 0, 0, 0, 0, 0.05]).normal_force > 0
+    True
     """
+
+    _batch: Batch
+    #: Contact points. Shape (m, 3).
+    contacts: Floats
+    #: Unit normals pointing into the object. Shape (m, 3).
+    normals: Floats
+    #: Shape (3,).
+    center_of_mass: Floats
+    #: Friction coefficient of each contact. Shape (m,).
+    friction: Floats
+    #: Edges of each friction cone.
+    edges: int
+    #: Torsional friction of soft fingers, in the unit of length; 0 for hard ones.
+    torsion: float
+    #: Torques are divided by this length for the quality.
+    length_scale: float
 
     def __init__(
         self,
@@ -81,26 +120,28 @@ class WrenchSpace:
         torsion: float | None = None,
         length_scale: float | None = None,
     ) -> None:
-        self._batch = batch(
-            contacts, normals, center_of_mass, friction, edges, torsion, length_scale
-        )
-        if self._batch.shape:
+        grasp = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+        if grasp.shape:
             raise GraspModuliError(
-                f"contacts must be one grasp, of shape (m, 3), got a batch of {self._batch.shape}"
+                f"contacts must be one grasp, of shape (m, 3), got a batch of {grasp.shape}"
             )
-        _, directions, _, each = self._batch.arrays
-        points, center, self.torsion = self._batch.given
-        (mu,), self.edges, _ = self._batch.cone
-        #: Contact points. Shape (m, 3).
-        self.contacts: Floats = locked(points.copy())
-        #: Unit normals pointing into the object. Shape (m, 3).
-        self.normals: Floats = locked(directions[0])
-        #: Shape (3,).
-        self.center_of_mass: Floats = locked(center.copy())
-        #: Friction coefficient of each contact. Shape (m,).
-        self.friction: Floats = locked(np.full(len(points), mu) if each is None else each[0])
-        #: Torques are divided by this length for the quality.
-        self.length_scale = float(self._batch.scale)
+        _, directions, _, each = grasp.arrays
+        points, center, gamma = grasp.given
+        (mu,), sides, _ = grasp.cone
+        self.__dict__.update(
+            _batch=grasp,
+            contacts=locked(points.copy()),
+            normals=locked(directions[0]),
+            center_of_mass=locked(center.copy()),
+            friction=locked(np.full(len(points), mu) if each is None else each[0]),
+            edges=sides,
+            torsion=gamma,
+            length_scale=float(grasp.scale),
+        )
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # What has been computed would no longer be true.
+        raise AttributeError(f"a WrenchSpace cannot be changed: make another one, with its {name}")
 
     def _key(self) -> tuple[Any, ...]:
         return (

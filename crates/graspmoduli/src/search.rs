@@ -246,9 +246,9 @@ struct Worker<'a> {
     size: usize,
     grasp: Vec<Contact>,
     grasp_frictions: Vec<f64>,
-    /// Wrenches of all contacts, `edges` each.
+    /// Wrenches of all contacts, `per_contact` each.
     wrenches: Vec<Twist>,
-    edges: usize,
+    per_contact: usize,
     /// How far a support value must be below the threshold.
     margin: f64,
     /// Per direction, the maximum of ⟨v, w⟩ over each contact's wrenches.
@@ -279,9 +279,11 @@ impl<'a> Worker<'a> {
             .enumerate()
             .flat_map(|(i, contact)| {
                 let frame = Frame::new(contact.normal);
-                (0..cone.len()).map(move |j| {
-                    let force = own.edge(i, &frame, j);
-                    let torque = (contact.point - center).cross(force);
+                (0..own.generators()).map(move |j| {
+                    let (force, spin) = own.generator(i, j);
+                    let force = frame.turn(force);
+                    let torque =
+                        (contact.point - center).cross(force) + spin * contact.normal;
                     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
                 })
             })
@@ -300,7 +302,7 @@ impl<'a> Worker<'a> {
             grasp: Vec::new(),
             grasp_frictions: Vec::new(),
             wrenches,
-            edges: cone.len(),
+            per_contact: cone.generators(),
             margin: longest * MARGIN,
             supports: Vec::new(),
             oldest: 0,
@@ -429,7 +431,7 @@ impl<'a> Worker<'a> {
     }
 
     fn add_direction(&mut self, direction: Twist) {
-        let supports: Vec<f64> = supports(&self.wrenches, self.edges, &direction);
+        let supports: Vec<f64> = supports(&self.wrenches, self.per_contact, &direction);
         let slot = self.supports.len();
         let slot = if slot < DIRECTIONS {
             self.supports.push(supports);
@@ -476,9 +478,9 @@ fn first_open(pair: &Mask, masks: &[Mask], from: usize) -> usize {
 
 /// max ⟨direction, w⟩ over each contact's wrenches.
 #[multiversion(targets("x86_64+avx+avx2"))]
-fn supports(wrenches: &[Twist], edges: usize, direction: &Twist) -> Vec<f64> {
+fn supports(wrenches: &[Twist], per_contact: usize, direction: &Twist) -> Vec<f64> {
     wrenches
-        .chunks_exact(edges)
+        .chunks_exact(per_contact)
         .map(|own| {
             own.iter()
                 .map(|w| w.iter().zip(direction).map(|(a, b)| a * b).sum::<f64>())

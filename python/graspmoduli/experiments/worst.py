@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._arrays import Floats
+from .._core import arctan2, cos, sin
 from ..quality import quality, quality_gradient
 from .settings import PAPERS_CONE, Cone
 
@@ -203,9 +204,12 @@ def _within(grasps: Floats, rows: Floats, epsilon: float) -> Floats:
     turned = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     across = turned - (turned * n).sum(-1, keepdims=True) * n
     length = np.linalg.norm(across, axis=-1, keepdims=True)
-    angle = np.minimum(np.arctan2(length, (turned * n).sum(-1, keepdims=True)),
-                       2.0 * np.arcsin(0.5 * reach))  # fmt: skip
-    turned = np.cos(angle) * n + np.sin(angle) * across / np.maximum(length, 1e-300)
+    along = (turned * n).sum(-1, keepdims=True)
+    angle = arctan2(length.ravel(), along.ravel()).reshape(length.shape)
+    # Of a chord as long as that.
+    half = arctan2(np.array([0.5 * reach]), np.sqrt([1.0 - 0.25 * reach**2]))
+    angle = np.minimum(angle, 2.0 * half)
+    turned = cos(angle) * n + sin(angle) * across / np.maximum(length, 1e-300)
     turned = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
     return join(ball(contacts, c), turned, ball(centers, z))
 
@@ -231,9 +235,10 @@ def _turned(rows: Floats, cone: Cone, directions: int = 16) -> Floats:
     """n₁ moved away from −e₃ by a little, in the direction that is worst for each row."""
     best, best_values = rows, np.full(len(rows), np.inf)
     # From direction φ the cone is turned by 2φ; a polygon of l edges is its own after 2π/l.
-    for angle in np.pi / cone.edges * np.arange(directions) / directions:
+    angles = np.pi / cone.edges * np.arange(directions) / directions
+    for x, y in zip(cos(angles), sin(angles), strict=True):
         trial = rows.copy()
-        trial[:, 9:12] = [NEAR_POLE * np.cos(angle), NEAR_POLE * np.sin(angle), -1.0]
+        trial[:, 9:12] = [NEAR_POLE * x, NEAR_POLE * y, -1.0]
         values = _values(trial, cone)
         wins = values < best_values
         best = np.where(wins[:, None], trial, best)
