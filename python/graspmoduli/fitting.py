@@ -54,7 +54,9 @@ from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regr
 
 #: The version of the files that Fit.save writes.
 FILE_VERSION = 2
-#: More unexplained than this is refused.
+#: Grasps of a mesh of lower quality are force closure, but hold nothing.
+LEAST = 1e-3
+#: More unexplained than this is refused, of a cloud of points.
 MOST_UNEXPLAINED = 0.4
 #: Axes whose scores, numbers of order 1, are this close are equally good.
 TIE = 1e-6
@@ -210,7 +212,7 @@ class Fit(Value):
             Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
         top
             How many grasps are wanted. Fewer come back if fewer are found, none if the object is
-            too thin for these tips or too slippery.
+            too thin for these tips or too slippery: on a mesh, qualities below 0.001 do not count.
         friction, edges
             As in :func:`graspmoduli.quality`; friction positive, a number or one per finger.
         seed
@@ -235,7 +237,7 @@ class Fit(Value):
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
         wanted = Search(hand, center, self.length_scale, size, many, aim)
         found = search(self.mesh, radius, start, wanted)
-        grasps = self._touched(found, wanted)
+        grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
         # Equal ones stay in the order of their Q_l.
         key = _round if errors is None else _low
         return sorted(grasps, key=key, reverse=True)[:many]

@@ -136,7 +136,7 @@ def plot_contact_map(fit: Fit, contacts: ContactMap, *, title: str = "") -> Figu
     figure = Figure(figsize=(8.4, 5.0), dpi=150, facecolor="white")
     rotation, origin = fit.pose[:3, :3], fit.pose[:3, 3]
     points, normals = (contacts.contacts - origin) @ rotation, contacts.normals @ rotation
-    shades = colormaps["cividis"]((np.clip(contacts.bearing, 0.2, 1.0) - 0.2) / 0.8)
+    shades = colormaps["viridis"]((np.clip(contacts.bearing, 0.2, 1.0) - 0.2) / 0.8)
     frames = contact_frames(points, normals)
     turns = 2 * np.pi * np.arange(9) / 8
     ring = np.cos(turns)[:, None, None] * frames[:, :3, 0]
@@ -153,7 +153,7 @@ def plot_contact_map(fit: Fit, contacts: ContactMap, *, title: str = "") -> Figu
             corners = np.stack([points, one, two], axis=1)[seen]
             flat, depth = camera.project(corners)
             # In front of the triangles on which they lie.
-            nearness = depth.mean(axis=1) + 0.02 * fit.residual.size
+            nearness = depth.mean(axis=1) + 0.1 * fit.residual.size
             scene.add(flat, nearness, shades[seen], shades[seen], 0.3)
         scene.draw(axes)
         finish(axes)

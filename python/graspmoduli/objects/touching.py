@@ -169,8 +169,7 @@ def contact_map(
     A tip, a ball, comes straight from outside. It touches what it meets first, on either side of a
     triangle; it feels the mean of the normals under its pad, weighted by how deep it is pressed
     there; it is turned to that twice. It may press where it is not stopped before its middle
-    touches and the normal that it feels is within 20° of the way it comes, and, unless fewer than
-    30 such places are found, where it also touches if it aims half a radius beside.
+    touches and the normal that it feels is within 20° of the way it comes.
 
     Parameters
     ----------
