@@ -17,7 +17,7 @@ import numpy as np
 
 import graspmoduli as gm
 import mutations
-from graspmoduli.reading import read
+from graspmoduli.objects.reading import read
 
 CHANGES = (mutations.cut, mutations.flip, mutations.zeroed, mutations.nan, mutations.count,
            mutations.moved)  # fmt: skip

@@ -10,9 +10,9 @@ import trimesh
 import graspmoduli as gm
 import reference
 from conftest import ROOT, objects
-from graspmoduli import fitting
-from graspmoduli.axes import candidate_axes
-from graspmoduli.reading import read
+from graspmoduli.objects import fitting
+from graspmoduli.objects.axes import candidate_axes
+from graspmoduli.objects.reading import read
 
 BOTTLE = ROOT / "examples" / "objects" / "yogurt_bottle.ply"
 

@@ -8,8 +8,8 @@ from matplotlib.collections import PolyCollection
 from PIL import Image
 
 import graspmoduli as gm
-from graspmoduli import plotting
-from graspmoduli.reading import read
+from graspmoduli.objects.reading import read
+from graspmoduli.viewing import plotting
 from test_processes import can
 
 SURFACES = gm.shapes.MODELS

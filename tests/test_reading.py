@@ -12,7 +12,7 @@ from trimesh.exchange.stl import export_stl_ascii
 
 import graspmoduli as gm
 import mutations
-from graspmoduli.reading import read
+from graspmoduli.objects.reading import read
 
 FILES = mutations.files()
 

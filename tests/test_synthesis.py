@@ -1,6 +1,7 @@
 """Grasps, exhaustive search and synthesis."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -284,7 +285,7 @@ class TestSoftFingers:
         u, theta = gm.sample_points(box, 14, seed=3)
         subsets = np.array(list(itertools.combinations(range(14), m)))
         contacts, normals = box.points(u, theta)[subsets], box.normals(u, theta)[subsets]
-        hand = {"friction": 0.6, "torsion": 0.15}
+        hand: Any = {"friction": 0.6, "torsion": 0.15}
         q = gm.quality(contacts, normals, box.center_of_mass, **hand)
         order = np.argsort(-q, kind="stable")[:3]
         found = gm.best_grasps(box, u, theta, contacts=m, top=3, **hand)

@@ -36,7 +36,7 @@ def read(path) -> tuple[np.ndarray, np.ndarray]:
 def check(vertices, faces, name, **options: Any) -> list[Any]:
     """Grasps of a mesh, every one of them judged by code that is not the package's."""
     mesh = true_grasps.Mesh(vertices, faces)
-    grasps = quiet_fit((vertices, faces)).synthesize(**options)
+    grasps: list[Any] = quiet_fit((vertices, faces)).synthesize(**options)
     assert grasps
     for grasp in grasps:
         friction = options.get("friction", 1.0)

@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from graspmoduli import _core
-from graspmoduli.axes import (
+from graspmoduli.objects.axes import (
     _axis_of_revolution,
     _frame,
     candidate_axes,
@@ -15,8 +15,8 @@ from graspmoduli.axes import (
     same_axis,
     score,
 )
-from graspmoduli.reading import read
-from graspmoduli.walls import (
+from graspmoduli.objects.reading import read
+from graspmoduli.objects.walls import (
     FOR_SCANS,
     Axis,
     Grid,

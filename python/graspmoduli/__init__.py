@@ -34,10 +34,6 @@ from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
 from .epsilon import Epsilon as Epsilon
 from .epsilon import epsilon as epsilon
-from .fitting import Fit as Fit
-from .fitting import ObjectGrasp as ObjectGrasp
-from .fitting import Residual as Residual
-from .fitting import fit as fit
 from .grasps import Grasp as Grasp
 from .grasps import GraspGradient as GraspGradient
 from .grasps import PlacedGrasp as PlacedGrasp
@@ -55,6 +51,10 @@ from .moduli import placed_distance as placed_distance
 from .moduli import sample_combinations as sample_combinations
 from .moduli import sample_weights as sample_weights
 from .moduli import surface_distance as surface_distance
+from .objects.fitting import Fit as Fit
+from .objects.fitting import ObjectGrasp as ObjectGrasp
+from .objects.fitting import Residual as Residual
+from .objects.fitting import fit as fit
 from .objects.touching import ContactCheck as ContactCheck
 from .objects.touching import ContactMap as ContactMap
 from .objects.touching import contact_map as contact_map

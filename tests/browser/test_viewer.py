@@ -15,9 +15,9 @@ from playwright.sync_api import sync_playwright
 
 import graspmoduli as gm
 from conftest import ROOT
-from graspmoduli import viewer
-from graspmoduli.fitting import fit_object
-from graspmoduli.reading import read
+from graspmoduli.objects.fitting import fit_object
+from graspmoduli.objects.reading import read
+from graspmoduli.viewing import viewer
 
 OBJECT = ROOT / "examples" / "objects" / "yogurt_bottle.ply"
 #: Software rendering, and nothing fetched behind our back.

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..plotting import LINES
 from ..shapes import MODELS
 from ..transfers import transfer
+from ..viewing.plotting import LINES
 from .common import Pieces, Seconds, by_seed, counts, over_seeds, own_grasp, repetition, seeds_of
 from .report import BEYOND, Outcome, Row
 from .settings import Scale

@@ -22,11 +22,11 @@ from ..moduli import (
     sample_weights,
     surface_distance,
 )
-from ..plotting import LINES, plot_row
 from ..quality import circular_quality, quality
 from ..shapes import MODELS, NAMES
 from ..surfaces import Surface, combine
 from ..transfers import quality_along
+from ..viewing.plotting import LINES, plot_row
 from .common import (
     CORNERS,
     WEIGHTS,

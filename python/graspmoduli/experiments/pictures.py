@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .._arrays import Floats
-from ..drawing import Camera, Scene, add_body, finish
 from ..grasps import Grasp
 from ..moduli import Point, sample_combinations, sample_weights
-from ..plotting import ELEVATION, plot_path, plot_rows, plot_simplex
 from ..shapes import MODELS, NAMES
 from ..surfaces import Surface, combine
+from ..viewing.drawing import Camera, Scene, add_body, finish
+from ..viewing.plotting import ELEVATION, plot_path, plot_rows, plot_simplex
 from .common import CORNERS, WEIGHTS, Pieces, Seconds, own_grasp
 from .report import Outcome
 from .settings import Scale

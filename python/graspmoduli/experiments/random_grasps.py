@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from .. import _core
 from .._arrays import Floats
-from ..drawing import FINGERS, Camera
-from ..plotting import LINES
 from ..quality import quality
+from ..viewing.drawing import FINGERS, Camera
+from ..viewing.plotting import LINES
 from .report import BEYOND, Outcome, Row
 from .settings import Scale
 from .worst import proven_radius, split, steepest_at_the_pole, worst_neighbour

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from ..grasps import Grasp
 from ..moduli import sample_combinations
-from ..plotting import LINES
 from ..sampling import sample_points
 from ..shapes import MODELS, NAMES
 from ..surfaces import project
 from ..synthesis import best_grasps, plane_grasp, synthesize
 from ..transfers import transfer
+from ..viewing.plotting import LINES
 from .common import (
     Pieces,
     Seconds,

@@ -17,7 +17,7 @@ from .._arrays import Floats, cores, count, locked, number
 from .._batches import Cone
 from .._core import GraspModuliError
 from .._values import Value
-from ..reading import Object, read
+from .reading import Object, read
 
 #: The radius of a fingertip over the size of the object, if none is given.
 TIP = 0.05

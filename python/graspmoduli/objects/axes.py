@@ -14,8 +14,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import Floats
-from ._core import cos, sin, solve_banded
+from .._arrays import Floats
+from .._core import cos, sin, solve_banded
 from .reading import Object
 from .walls import CLOSE, Axis, coarse_hits, outermost, regress
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb, to_rgba
 
-from ._arrays import Floats
-from .grasps import Grasp
-from .surfaces import Surface
+from .._arrays import Floats
+from ..grasps import Grasp
+from ..surfaces import Surface
 
 #: Colours of the fingers, told apart by the colour-blind too (Okabe & Ito).
 FINGERS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00")

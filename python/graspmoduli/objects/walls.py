@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arrays import Floats
-from ._core import GraspModuliError, arctan2, cos, sin, solve_banded
+from .._arrays import Floats
+from .._core import GraspModuliError, arctan2, cos, sin, solve_banded
+from ..surfaces import Surface, clamped_knots
 from .reading import Object
-from .surfaces import Surface, clamped_knots
 
 #: A point this close to the fitted surface, relative to the object's size, is explained by it.
 CLOSE = 0.02

@@ -30,9 +30,9 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from . import _arrays, _signals
-from ._core import GraspModuliError
-from ._files import check_output, replacing
+from .. import _arrays, _signals
+from .._core import GraspModuliError
+from .._files import check_output, replacing
 
 app = typer.Typer(
     add_completion=False,
@@ -257,8 +257,8 @@ def reproduce(
     ] = None,
 ) -> None:
     """Run the paper's experiments, ours beside the paper's; goes on where it was stopped."""
-    from .experiments import Progress as Step
-    from .experiments import reproduce as run
+    from ..experiments import Progress as Step
+    from ..experiments import reproduce as run
 
     console = Console(stderr=True)
     shown = console.is_terminal
@@ -339,7 +339,7 @@ def view(
         raise GraspModuliError("shapes must be shown in a browser, got html or picture with it")
     if thing is not None:
         _check_outputs(thing, html=html, picture=picture)
-    from . import viewer
+    from ..viewing import viewer
 
     if not saved:
         # A busy port is found out before the work.
@@ -391,7 +391,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _image(path: Path, thing: str, found: Any, friction: float, edges: int) -> bytes:
-    from .plotting import plot_grasps
+    from ..viewing.plotting import plot_grasps
 
     # Dollars would start a formula; what is no character of any language cannot be drawn.
     title = Path(thing).name.replace("$", "\\$").encode("utf-8", "replace").decode()
@@ -409,11 +409,11 @@ def _find(
     path: str, options: dict[str, Any], step: Callable[[str, float], None]
 ) -> tuple[Any, Any, Any]:
     step("reading", 0.0)
-    from .reading import read
+    from ..objects.reading import read
 
     thing = read(path)
     step("fitting", 0.1)
-    from .fitting import fit_object
+    from ..objects.fitting import fit_object
 
     fit = fit_object(thing, lambda done, total: step("fitting", 0.1 + 0.65 * done / total))
     step("finding grasps", 0.8)

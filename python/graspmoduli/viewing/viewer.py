@@ -17,19 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from ._arrays import Floats
-from ._core import GraspModuliError
+from .._arrays import Floats
+from .._core import GraspModuliError
+from ..grasps import Grasp, place
+from ..objects.fitting import Fit, ObjectGrasp
+from ..objects.reading import Object
+from ..quality import quality
+from ..sampling import sample_points
+from ..shapes import MODELS, NAMES
+from ..surfaces import Surface, combine
+from ..synthesis import synthesize
+from ..transfers import transfer
+from ..wrench_space import WrenchSpace
 from .drawing import BODY, FILLED, FINGERS, NET, SEEN, azimuth_across, azimuth_of
-from .fitting import Fit, ObjectGrasp
-from .grasps import Grasp, place
-from .quality import quality
-from .reading import Object
-from .sampling import sample_points
-from .shapes import MODELS, NAMES
-from .surfaces import Surface, combine
-from .synthesis import synthesize
-from .transfers import transfer
-from .wrench_space import WrenchSpace
 
 try:
     import trimesh

@@ -1,0 +1,1 @@
+"""Pictures and the pages of the viewer."""
