@@ -326,3 +326,31 @@ def test_a_plate_is_too_thin(tmp_path):
     assert done.returncode == 1
     assert "too thin for these tips" in done.stderr
     assert json.loads(out.read_text())["grasps"] == []
+
+
+class TestAgreement:
+    def test_what_is_a_cylinder_is_explained(self):
+        fit = gm.fit(objects_made.bottle())
+        assert fit.unexplained < 0.01
+        assert fit.coverage > 0.99
+
+    def test_a_handle_is_not_explained_in_proportion_to_its_area(self):
+        made = objects_made.mug()
+        with pytest.warns(UserWarning, match="of the object's visible area is not explained"):
+            fit = gm.fit(made)
+        # Handle, and what is seen of the inside.
+        body = np.hypot(made.triangles_center[:, 0], made.triangles_center[:, 1]) < 0.042
+        handle = made.area_faces[~body].sum()
+        outside = made.area_faces[body].sum() / 2
+        assert fit.unexplained == pytest.approx(handle / (handle + outside), abs=0.1)
+        assert fit.coverage > 0.99
+
+    def test_a_surface_in_the_air_is_not_covered(self):
+        with pytest.warns(UserWarning, match="of the surface has no object near it"):
+            fit = gm.fit(objects_made.bracket())
+        assert fit.coverage < 0.5
+        made = objects_made.bracket()
+        mesh = true_grasps.Mesh(made.vertices, made.faces)
+        points = fit.to_object(fit.surface.points(*gm.sample_points(fit.surface, 400)))
+        far = np.mean([mesh.nearest(point)[0] > 0.02 for point in mesh.local(points)])
+        assert 1.0 - fit.coverage == pytest.approx(far, abs=0.06)
