@@ -18,7 +18,7 @@ demo: $(READY) ## Grasps for a real bottle: table, JSON and picture in out/
 	    --json out/yogurt_bottle.json --picture out/yogurt_bottle.png
 
 test: $(READY) ## Every test that is quick, Rust and Python
-	cargo test --release --quiet --package graspmoduli
+	cargo test --release --quiet --package graspmoduli --features objects
 	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser \
 	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py \
 	    --ignore python/graspmoduli/viewing/viewer.py -m 'not long' python tests

@@ -14,11 +14,13 @@ given = sys.argv[1:3] or [objects / "yogurt_bottle.ply", objects / "cosmetics_po
 folder = Path(sys.argv[3] if len(sys.argv) > 3 else "out")
 
 source, target = (gm.fit(path) for path in given)
-best = source.synthesize(top=1)[0]
-print(f"best grasp of the source: Q = {best.quality:.4f}")
-
 # Surfaces of a size, so that shapes are compared and not sizes.
 start, end = source.unit_surface, target.unit_surface
+best, own = (
+    gm.synthesize(fit.unit_surface, top=1, allowed=fit.allowed)[0] for fit in (source, target)
+)
+print(f"best grasp of the source: Q = {best.quality:.4f}")
+
 apart = gm.surface_distance(start, end)
 promise = gm.certify_transfer(start, best.grasp, end)
 print(f"d(S, T) = {apart:.3f}; contacts and normals move by at most {promise.distance:.3f},")
@@ -33,7 +35,6 @@ for method, way in ways.items():
     print(f"{method:8} Q = {way.quality:.4f} on the surface, {real.quality:.4f} on the mesh")
     rows.append(((end, way.grasp), method))
 
-own = target.synthesize(top=1)[0]
 print(f"from scratch: Q = {own.quality:.4f}")
 rows.append(((end, own.grasp), "from scratch"))
 

@@ -42,7 +42,8 @@ def test_grasp_writes_table_json_and_picture(tmp_path):
     report = json.loads(json_file.read_text())
     assert set(report) >= {"object", "fit", "friction", "edges", "length_scale", "grasps"}
     assert set(report["fit"]) >= {"residual_rms", "residual_max", "coverage", "pose"}
-    qualities = [grasp["quality"] for grasp in report["grasps"]]
+    assert report["schema"] == 1
+    qualities = [grasp["round_quality"][0] for grasp in report["grasps"]]
     assert qualities == sorted(qualities, reverse=True)
     assert len(qualities) == 3
     mesh = trimesh.load_mesh(BOTTLE)
@@ -55,7 +56,9 @@ def test_grasp_writes_table_json_and_picture(tmp_path):
         )
         assert value == pytest.approx(grasp["quality"], rel=1e-12)
         _, distance, _ = trimesh.proximity.closest_point(mesh, grasp["contacts"])
-        assert distance.max() < 0.02 * mesh.extents.max()
+        assert distance.max() < 1e-9 * mesh.extents.max()
+        assert all(check["seen"] and check["bearing"] > 0.3 for check in grasp["checks"])
+        assert grasp["held"] > 0.99
         assert len(grasp["u"]) == len(grasp["theta"]) == 3
 
 

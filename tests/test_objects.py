@@ -182,7 +182,7 @@ class TestFiles:
             gm.Fit.load(path)
         with path.open("wb") as file:
             np.savez(file, graspmoduli_fit=99)
-        with pytest.raises(gm.GraspModuliError, match="version 1, got version 99"):
+        with pytest.raises(gm.GraspModuliError, match="version 2, got version 99"):
             gm.Fit.load(path)
         with pytest.raises(gm.GraspModuliError, match="path must be the path of a file"):
             gm.Fit.load(None)  # type: ignore[arg-type]

@@ -203,9 +203,9 @@ class TestStreams:
         os.close(ours)
         assert b"\x1b[3" not in text
         rows = [line.split() for line in text.decode().splitlines() if line.strip()]
-        # Rank, quality and three fingers in a row; or a row for each finger.
-        wide = [row for row in rows if row[0] in ("1", "2") and len(row) == 11]
-        first = [row for row in rows if row[0] in ("1", "2") and len(row) == 6]
+        # Rank, two qualities and three fingers in a row; or a row for each finger.
+        wide = [row for row in rows if row[0] in ("1", "2") and len(row) == 12]
+        first = [row for row in rows if row[0] in ("1", "2") and len(row) == 7]
         further = [row for row in rows if row[0] in ("2", "3") and len(row) == 4]
         counts = len(wide), len(first), len(further)
         assert counts == ((2, 0, 0) if width == 200 else (0, 2, 4))

@@ -88,6 +88,7 @@ class Mesh:
                 best, where = away.min(), foot[away.argmin()]
         return best, where
 
+    @np.errstate(all="ignore")
     def ball(self, start, way, radius):
         """Where a ball that comes along a way first touches: how far its centre goes, and the
         point; inf and None if it passes. By faces, sides and corners in closed form."""

@@ -282,8 +282,7 @@ impl<'a> Worker<'a> {
                 (0..own.generators()).map(move |j| {
                     let (force, spin) = own.generator(i, j);
                     let force = frame.turn(force);
-                    let torque =
-                        (contact.point - center).cross(force) + spin * contact.normal;
+                    let torque = (contact.point - center).cross(force) + spin * contact.normal;
                     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
                 })
             })

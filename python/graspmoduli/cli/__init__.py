@@ -516,7 +516,7 @@ def _words(fit: Any, grasps: Any) -> list[str]:
     values = [grasp.round_quality[0] for grasp in grasps]
     equal = sum(value >= (1.0 - TIE) * max(values) for value in values)
     if equal > 1:
-        words.append(f"{equal} of the grasps are a tie: within {TIE:.0%} of the best.")
+        words.append(f"A tie: {equal} of the grasps are within {TIE:.0%} of the best.")
     if fit.mesh is not None:
         checks = [check for grasp in grasps for check in grasp.checks]
         angle = math.degrees(max(check.angle for check in checks))

@@ -38,6 +38,7 @@ from ..quality import circular_quality, quality
 from ..surfaces import Surface
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
+from .agreement import phantom_area, unexplained_area
 from .axes import candidate_axes, refined, same_axis, score
 from .reading import Object, read
 from .touching import (
@@ -54,12 +55,16 @@ from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regr
 
 #: The version of the files that Fit.save writes.
 FILE_VERSION = 2
-#: More unexplained than this is refused.
+#: Grasps of a mesh of lower quality are force closure, but hold nothing.
+LEAST = 1e-3
+#: More unexplained than this is refused, of a cloud of points.
 MOST_UNEXPLAINED = 0.4
 #: Axes whose scores, numbers of order 1, are this close are equally good.
 TIE = 1e-6
 #: More unexplained than this is worth a warning.
 WORTH_A_WARNING = 0.005
+#: So is more of a mesh's visible area, and less of the surface with the mesh near it.
+WORTH_A_WARNING_OF_MESH, LEAST_COVERAGE = 0.05, 0.9
 
 
 @dataclass(frozen=True)
@@ -135,9 +140,11 @@ class Fit(Value):
     #: Rigid motion from the surface's coordinates to the object's. Shape (4, 4).
     pose: Floats
     residual: Residual
-    #: Share of the surface's area where the object was seen; the rest is filled in smoothly.
+    #: Share of the surface's area where there is an object: of a mesh, within 2 % of its size; of a
+    #: cloud, where it was seen, as the rest is filled in smoothly.
     coverage: float
-    #: Share of the object's outer wall that is not within 2 % of its size of the surface.
+    #: Share of the object farther than 2 % of its size from the surface: of a mesh, of the area
+    #: visible from outside, the surface being closed by lids; of a cloud, of its outer wall.
     unexplained: float
     #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
     #: Shape (k, n).
@@ -210,7 +217,7 @@ class Fit(Value):
             Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
         top
             How many grasps are wanted. Fewer come back if fewer are found, none if the object is
-            too thin for these tips or too slippery.
+            too thin for these tips or too slippery: on a mesh, qualities below 0.001 do not count.
         friction, edges
             As in :func:`graspmoduli.quality`; friction positive, a number or one per finger.
         seed
@@ -235,7 +242,7 @@ class Fit(Value):
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
         wanted = Search(hand, center, self.length_scale, size, many, aim)
         found = search(self.mesh, radius, start, wanted)
-        grasps = self._touched(found, wanted)
+        grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
         # Equal ones stay in the order of their Q_l.
         key = _round if errors is None else _low
         return sorted(grasps, key=key, reverse=True)[:many]
@@ -308,6 +315,19 @@ class Fit(Value):
         normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
         return self._object_grasp(grasp, contacts, normals, hand, center)
 
+    def on_surface(self, grasp: ObjectGrasp) -> Grasp:
+        """The grasp's place in G^cyl: contact coordinates of its contacts on the fitted surface.
+
+        Of contacts that are not on it, those of the nearest points of the surface.
+        """
+        if not isinstance(grasp, ObjectGrasp):
+            raise GraspModuliError(f"grasp must be an ObjectGrasp, got {brief(grasp)}")
+        if grasp.grasp is not None:
+            return grasp.grasp
+        local = (grasp.contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
+        u, theta, _ = self.surface.coordinates(local)
+        return Grasp(u, theta)
+
     def on_mesh(
         self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
     ) -> ObjectGrasp:
@@ -350,7 +370,7 @@ class Fit(Value):
     def transfer_to(
         self,
         target: Fit,
-        grasp: Grasp,
+        grasp: Grasp | ObjectGrasp,
         method: str = "ascent",
         *,
         friction: ArrayLike = 1.0,
@@ -366,6 +386,8 @@ class Fit(Value):
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
+        if isinstance(grasp, ObjectGrasp):
+            grasp = self.on_surface(grasp)
         start, end = self.unit_surface, target.unit_surface
         allowed = target.allowed if method == "ascent" else None
         carried = transfer(
@@ -608,18 +630,32 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     seen = np.bincount(hits.cell[wall], minlength=cells) > 0
     good = np.bincount(hits.cell[explained], minlength=cells) > 0
     sticking = np.bincount(hits.cell[outside], minlength=cells) > (0 if mesh else 2)
-    unexplained = float((seen & (~good | sticking)).sum() / max(seen.sum(), 1))
-    if unexplained > MOST_UNEXPLAINED and not mesh:
-        raise GraspModuliError(
-            "object must be close to a surface in cylindrical coordinates about some axis, "
-            f"got one whose outer wall is not for {unexplained:.0%}"
-        )
-    if unexplained > WORTH_A_WARNING:
-        warnings.warn(
-            f"{unexplained:.1%} of the object's outer wall is not explained by the fitted surface; "
-            + ("grasps there have no contact coordinates" if mesh else "no grasp is offered there"),
-            stacklevel=stacklevel,
-        )
+    pose, body = _pose(axis, middle), TriangleMesh.of(thing)
+    if body is not None:
+        unexplained = unexplained_area(thing, body, surface, pose)
+        coverage = 1.0 - phantom_area(body, surface, pose)
+        if unexplained > WORTH_A_WARNING_OF_MESH or coverage < LEAST_COVERAGE:
+            warnings.warn(
+                f"{unexplained:.0%} of the object's visible area is not explained by the fitted "
+                f"surface, and {1.0 - coverage:.0%} of the surface has no object near it; grasps "
+                "are true all the same, but have no contact coordinates off the surface",
+                stacklevel=stacklevel,
+            )
+    else:
+        unexplained = float((seen & (~good | sticking)).sum() / max(seen.sum(), 1))
+        coverage = _coverage(surface, good.reshape(grid.rows, grid.columns))
+        if unexplained > MOST_UNEXPLAINED:
+            raise GraspModuliError(
+                "object must be close to a surface in cylindrical coordinates about some axis, "
+                f"got one whose outer wall is not for {unexplained:.0%}; a mesh of it could be "
+                "grasped all the same"
+            )
+        if unexplained > WORTH_A_WARNING:
+            warnings.warn(
+                f"{unexplained:.1%} of the object's outer wall is not explained by the fitted "
+                "surface; no grasp is offered there",
+                stacklevel=stacklevel,
+            )
     # A wall that leans more than the surface, such as a lid's rim, is not what a finger meets.
     crooked = np.abs(np.abs(normals[:, 2]) - hits.tilt) > 0.5
     rough = mesh & (np.bincount(hits.cell[explained & crooked], minlength=cells) > 0)
@@ -638,12 +674,12 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     )
     return Fit(
         surface=surface,
-        pose=_pose(axis, middle),
+        pose=pose,
         residual=residual,
-        coverage=_coverage(surface, good.reshape(grid.rows, grid.columns), mesh),
+        coverage=coverage,
         unexplained=unexplained,
         allowed=allowed,
-        mesh=TriangleMesh.of(thing),
+        mesh=body,
     )
 
 
@@ -654,8 +690,8 @@ def _pose(axis: Axis, middle: float) -> Floats:
     return locked(pose)
 
 
-def _coverage(surface: Surface, good: Booleans, mesh: bool) -> float:
-    """Share of the area in cells that were seen; a cloud may leave small holes between points."""
+def _coverage(surface: Surface, good: Booleans) -> float:
+    """Share of the area in cells where a cloud was seen, small holes between its points aside."""
     rows, columns = good.shape
     u, theta = np.meshgrid(
         (np.arange(rows) + 0.5) / rows,
@@ -664,7 +700,7 @@ def _coverage(surface: Surface, good: Booleans, mesh: bool) -> float:
     )
     first, second = surface.tangents(u, theta)
     area = np.linalg.norm(np.cross(first, second), axis=-1)
-    covered = good if mesh else ~_dilated(~_dilated(good, 1), 1)
+    covered = ~_dilated(~_dilated(good, 1), 1)
     return float(area[covered].sum() / area.sum())
 
 

@@ -124,17 +124,26 @@ def _is_closed(vertices: Floats, faces: NDArray[np.int64]) -> bool:
 
     Corners in the same place are the same, as in files that repeat them.
     """
+    if _is_paired(faces, len(vertices)):
+        return True
     order = np.lexsort(vertices.T)
     new = np.append(False, (np.diff(vertices[order], axis=0) != 0.0).any(axis=1))
     number = np.empty(len(vertices), dtype=np.int64)
     number[order] = np.cumsum(new)
-    merged = number[faces]
-    one, other = merged.ravel(), merged[:, [1, 2, 0]].ravel()
-    degenerate = one == other
-    one, other = one[~degenerate], other[~degenerate]
-    forth = np.sort(one * len(vertices) + other)
-    back = np.sort(other * len(vertices) + one)
-    return bool(np.array_equal(forth, back))
+    return not new[1:].all() and _is_paired(number[faces], len(vertices))
+
+
+def _is_paired(faces: NDArray[np.int64], count: int) -> bool:
+    """Is every directed edge there as often as its reverse?"""
+    one, other = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    edges = one != other
+    one, other = one[edges], other[edges]
+    if (np.bincount(one, minlength=count) != np.bincount(other, minlength=count)).any():
+        return False
+    up = one < other
+    rising = np.sort(one[up] * count + other[up])
+    falling = np.sort(other[~up] * count + one[~up])
+    return bool(np.array_equal(rising, falling))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +178,7 @@ def contact_map(
     A tip, a ball, comes straight from outside. It touches what it meets first, on either side of a
     triangle; it feels the mean of the normals under its pad, weighted by how deep it is pressed
     there; it is turned to that twice. It may press where it is not stopped before its middle
-    touches and the normal that it feels is within 20° of the way it comes, and, unless fewer than
-    30 such places are found, where it also touches if it aims half a radius beside.
+    touches and the normal that it feels is within 20° of the way it comes.
 
     Parameters
     ----------

@@ -6,21 +6,24 @@ Every function returns a :class:`matplotlib.figure.Figure`: ``plot_surface(S).sa
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
+from itertools import cycle, pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from .._arrays import Floats, count, floats
+from .._batches import contact_frames
 from .._core import GraspModuliError
 from ..grasps import Grasp, place
 from ..moduli import Point, interpolate, sample_weights
 from ..objects.fitting import Fit, ObjectGrasp
 from ..objects.reading import Object
+from ..objects.touching import ContactMap
 from ..quality import quality
 from ..surfaces import Surface, combine
 from ..transfers import QualityAlong, Transfer
@@ -67,8 +70,9 @@ def plot_grasps(
 ) -> Figure:
     """The object with its best grasp from two sides, and the next grasps smaller below.
 
-    The object is drawn solid, the fitted surface as a net over it, and each friction cone on the
-    side of the finger, with its apex at the contact and the inward normal as an arrow.
+    The object is drawn solid, with the fitted surface as a net over it where the grasp lies on it,
+    and each friction cone on the side of the finger, with its apex at the contact and the inward
+    normal as an arrow.
     """
     others = list(grasps[1:5])
     figure = Figure(figsize=(10.0, 7.6 if others else 5.6), dpi=150, facecolor="white")
@@ -111,13 +115,49 @@ def plot_grasps(
         Line2D([], [], marker="o", linestyle="", markeredgecolor="0.3", color="white",
                label="contact behind")
     )  # fmt: skip
-    handles.append(Line2D([], [], color=NET, linewidth=1.0, label="fitted surface"))
+    if any(_has_net(fit, grasp) for grasp in grasps):
+        handles.append(Line2D([], [], color=NET, linewidth=1.0, label="fitted surface"))
     if thing.faces is None:
         handles.append(Line2D([], [], marker="s", linestyle="", color=SEEN, label="points seen"))
     figure.legend(
         handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=9,
         bbox_to_anchor=(0.5, 0.0),
     )  # fmt: skip
+    return figure
+
+
+def plot_contact_map(fit: Fit, contacts: ContactMap, *, title: str = "") -> Figure:
+    """Where fingertips may press on an object's mesh, from two sides: a disc for each place.
+
+    Its colour is how much of the pad bears, from dark, a fifth or less, to light, the whole of it.
+    """
+    if fit.mesh is None:
+        raise GraspModuliError("fit must be that of a mesh, got a cloud of points")
+    figure = Figure(figsize=(8.4, 5.0), dpi=150, facecolor="white")
+    rotation, origin = fit.pose[:3, :3], fit.pose[:3, 3]
+    points, normals = (contacts.contacts - origin) @ rotation, contacts.normals @ rotation
+    shades = colormaps["viridis"]((np.clip(contacts.bearing, 0.2, 1.0) - 0.2) / 0.8)
+    frames = contact_frames(points, normals)
+    turns = 2 * np.pi * np.arange(9) / 8
+    ring = np.cos(turns)[:, None, None] * frames[:, :3, 0]
+    ring = ring + np.sin(turns)[:, None, None] * frames[:, :3, 1]
+    # Smaller than the tip, so that neighbours do not hide each other.
+    ring = points + 0.2 * contacts.tip_radius * ring
+    for column, turn in enumerate((0.6, 0.6 + np.pi)):
+        axes = figure.add_axes((0.5 * column, 0.05, 0.5, 0.85))
+        camera, scene = Camera(turn, ELEVATION), Scene()
+        solid = (fit.mesh.vertices - origin) @ rotation
+        _add_triangles(scene, camera, solid[fit.mesh.faces])
+        seen = (normals @ camera.towards) < 0.0
+        for one, two in pairwise(ring):
+            corners = np.stack([points, one, two], axis=1)[seen]
+            flat, depth = camera.project(corners)
+            # In front of the triangles on which they lie.
+            nearness = depth.mean(axis=1) + 0.1 * fit.residual.size
+            scene.add(flat, nearness, shades[seen], shades[seen], 0.3)
+        scene.draw(axes)
+        finish(axes)
+    figure.suptitle(f"{title}    {len(contacts)} places for a fingertip".strip(), fontsize=13)
     return figure
 
 
@@ -383,12 +423,17 @@ def _draw(
     camera = Camera(azimuth, ELEVATION)
     scene = Scene()
     _add_object(scene, camera, thing, fit)
-    if fit.mesh is None or grasp.grasp is not None:
+    if _has_net(fit, grasp):
         add_net(scene, camera, fit.surface)
     points, normals = _local(fit, grasp)
     scale = fit.length_scale
     add_fingers(axes, scene, camera, points, normals, scale, friction, edges, labels=labels)
     finish(axes)
+
+
+def _has_net(fit: Fit, grasp: ObjectGrasp) -> bool:
+    """Does the grasp lie on the fitted surface, so that it belongs into the picture?"""
+    return fit.mesh is None or grasp.grasp is not None
 
 
 def _local(fit: Fit, grasp: ObjectGrasp) -> tuple[Floats, Floats]:
@@ -411,7 +456,11 @@ def _add_object(scene: Scene, camera: Camera, thing: Object, fit: Fit) -> None:
             square = half * np.array([[-1.0, -1.0], [1.0, 1.0], [corner, -corner]])
             scene.add(flat[:, None, :] + square, depth, fill, (0, 0, 0, 0))
         return
-    triangles = local[thing.faces]
+    _add_triangles(scene, camera, local[thing.faces])
+
+
+def _add_triangles(scene: Scene, camera: Camera, triangles: Floats) -> None:
+    """A solid of triangles. Shape (n, 3, 3)."""
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
     keep = lengths > 0.0

@@ -233,7 +233,7 @@ class GraspPage:
     ) -> None:
         self.client, self.fit, self.grasps = client, fit, grasps
         self.surface = (1.0 / fit.length_scale) * fit.surface
-        self.grasp = on_wall(fit, grasps[0]) if grasps else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
+        self.grasp = fit.on_surface(grasps[0]) if grasps else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
         self.lock = threading.RLock()
         self.climbing = False
         scene, gui = client.scene, client.gui
@@ -271,7 +271,7 @@ class GraspPage:
         def choose(_: Any) -> None:
             if self.grasps:
                 chosen = self.grasps[min(int(self.rank.value), len(self.grasps)) - 1]
-                self.show(on_wall(fit, chosen))
+                self.show(fit.on_surface(chosen))
 
         self.rank.on_update(choose)
         self.friction.on_update(lambda _: self.show(self.grasp))
@@ -594,15 +594,6 @@ def serve_shapes(port: int, own: dict[str, Surface] | None = None) -> Any:
         ShapePage(client, own or {})
 
     return server
-
-
-def on_wall(fit: Fit, grasp: ObjectGrasp) -> Grasp:
-    """A grasp's contact coordinates, of contacts off the fitted surface those nearest to them."""
-    if grasp.grasp is not None:
-        return grasp.grasp
-    local = (grasp.contacts - fit.pose[:3, 3]) @ fit.pose[:3, :3]
-    u, theta, _ = fit.surface.coordinates(local)
-    return Grasp(u, theta)
 
 
 def page_of(thing: Object, fit: Fit, grasp: ObjectGrasp | None, friction: float, edges: int) -> str:

@@ -13,9 +13,6 @@ const BLOCKED: f64 = 0.35;
 const NEAR: f64 = 0.03;
 /// cos 20°: what a tip feels must be so close to how it comes.
 const STRAIGHT: f64 = 0.939_692_620_785_908_4;
-/// Fewer places than this are not enough to choose among: then those near edges count, too.
-const FEW: usize = 30;
-
 /// A place where a tip may press.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
@@ -32,13 +29,13 @@ pub struct Place {
 }
 
 /// The places found from samples of the area, a row of three random numbers in [0, 1) for each; the
-/// same for any number of threads. Only steady ones, unless they are too few.
+/// same for any number of threads.
 pub fn map(mesh: &Mesh, tip: &Tip, random: &[[f64; 3]]) -> Vec<Place> {
     if mesh.is_empty() {
         return Vec::new();
     }
     let count = random.len() as f64;
-    let found: Vec<Place> = random
+    random
         .par_iter()
         .enumerate()
         .flat_map_iter(|(k, &[jitter, a, b])| {
@@ -50,9 +47,7 @@ pub fn map(mesh: &Mesh, tip: &Tip, random: &[[f64; 3]]) -> Vec<Place> {
                 .filter(move |&way| is_seen(mesh, point, way))
                 .filter_map(move |way| settle(mesh, tip, point, way))
         })
-        .collect();
-    let steady: Vec<_> = found.iter().copied().filter(|place| place.steady).collect();
-    if steady.len() < FEW { found } else { steady }
+        .collect()
 }
 
 fn is_seen(mesh: &Mesh, point: DVec3, way: DVec3) -> bool {

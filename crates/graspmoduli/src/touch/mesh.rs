@@ -180,7 +180,7 @@ fn crossing([a, b, c]: &[DVec3; 3], start: DVec3, way: DVec3) -> Option<f64> {
     }
     let s = start - a;
     let u = s.dot(p) / det;
-    if !(u >= -RIM && u <= 1.0 + RIM) {
+    if !(-RIM..=1.0 + RIM).contains(&u) {
         return None;
     }
     let q = s.cross(one);
@@ -194,7 +194,7 @@ fn crossing([a, b, c]: &[DVec3; 3], start: DVec3, way: DVec3) -> Option<f64> {
 
 /// Where a moving ball is stopped by a triangle: by its inside, or one of its sides or corners.
 ///
-/// In closed form. The general sweep of shapes in parry takes forty times as long.
+/// In closed form: the general sweep of shapes in parry takes fifteen times as long and more.
 fn ball_stop(
     corners: &[DVec3; 3],
     normal: DVec3,

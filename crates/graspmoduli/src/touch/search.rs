@@ -22,6 +22,11 @@ const SHARE: f64 = 0.8;
 const SUBSETS: u64 = 170_000;
 /// Neighbours of a place on the map.
 const NEIGHBOURS: usize = 16;
+/// Fewer steady places than this are not enough to choose among.
+const FEW: usize = 30;
+/// Places that are not steady are taken where steady ones do not hold either and have grasps worse
+/// by this factor.
+const MUCH: f64 = 2.0;
 /// A grasp that holds in this share of errors of aim is not lost by them.
 const SURE: f64 = 0.99;
 /// How many of the best subsets are looked at for each grasp that is wanted; then, if they are too
@@ -121,8 +126,39 @@ fn matched(one: &[Place], other: &[Place], apart: f64, taken: &mut [bool]) -> bo
     false
 }
 
-/// Different grasps among the places of a map, true ones by what [`gate`] asks, best first.
+/// Different grasps among the places of a map, true ones by what [`gate`] asks, best first; more
+/// than are wanted, so that they can be ranked by something else.
 pub fn grasps(
+    mesh: &Mesh,
+    tip: &Tip,
+    map: &[Place],
+    wanted: &Wanted<'_>,
+    threads: usize,
+    stop: &AtomicBool,
+) -> Result<Vec<Found>, Error> {
+    let steady: Vec<_> = map.iter().copied().filter(|place| place.steady).collect();
+    if steady.len() >= map.len() {
+        return true_grasps(mesh, tip, map, wanted, threads, stop);
+    }
+    let found = if steady.len() >= FEW {
+        true_grasps(mesh, tip, &steady, wanted, threads, stop)?
+    } else {
+        Vec::new()
+    };
+    if found.iter().any(|grasp| grasp.checked.holds >= SURE) {
+        return Ok(found);
+    }
+    // Bad aim loses what steady places offer: then others must offer much more.
+    let others = true_grasps(mesh, tip, map, wanted, threads, stop)?;
+    let best = |grasps: &[Found]| grasps.first().map_or(0.0, |grasp| grasp.quality);
+    if best(&found) > 0.0 && best(&others) < MUCH * best(&found) {
+        return Ok(found);
+    }
+    Ok(others)
+}
+
+/// The best grasps among places, on pads that are as flat as they may be.
+fn true_grasps(
     mesh: &Mesh,
     tip: &Tip,
     map: &[Place],
