@@ -105,7 +105,7 @@ def polytope():
     points += [0.25, 0.1]
     inner = [0, 5, 10]
     fig, panels = plt.subplots(1, 3, figsize=(10.0, 3.2), layout="constrained")
-    for step, axes in enumerate(panels):
+    for axes in panels:
         ring = points[sorted(inner)]
         ends = np.roll(ring, -1, axis=0)
         outward = np.stack([(ends - ring)[:, 1], -(ends - ring)[:, 0]], axis=1)
@@ -131,7 +131,8 @@ def polytope():
         bare(axes)
         inner.append(farthest)
     fig.supxlabel(
-        "orange: the nearest facet, a lower bound; green: the farthest point beyond it, an upper one",
+        "orange: the nearest facet, a lower bound; "
+        "green: the farthest point beyond it, an upper one",
         fontsize=10,
     )
     return fig
@@ -192,8 +193,9 @@ def distance():
         block = np.s_[a : b + 1, c : d + 1]
         middle = values[(a + b) // 2, (c + d) // 2]
         found = max(found, middle)
-        bound = middle + 0.5 * (np.abs(slope_u[block]).max() * (u[b, 0] - u[a, 0])
-                                + np.abs(slope_t[block]).max() * (theta[0, d] - theta[0, c]))  # fmt: skip
+        along = np.abs(slope_u[block]).max() * (u[b, 0] - u[a, 0])
+        around = np.abs(slope_t[block]).max() * (theta[0, d] - theta[0, c])
+        bound = middle + 0.5 * (along + around)
         if bound <= found * 1.001 or depth == 7:
             kept.append((u[a, 0], u[b, 0], theta[0, c], theta[0, d]))
             continue
@@ -239,8 +241,9 @@ def glossary():
     for edge in rim[:-1]:
         axes.plot(*np.array([[0, 0, 0], edge]).T, color=BLUE, linewidth=1.4)
     axes.plot(*rim.T, color=BLUE, linewidth=1.4)
-    for vector, name in ((np.array([0, 0, 1.25]), "n, inward"),
-                         (np.array([0.9, 0, 0]), "R(n) e₁"), (np.array([0, 0.9, 0]), "R(n) e₂")):  # fmt: skip
+    names = {"n, inward": (0, 0, 1.25), "R(n) e₁": (0.9, 0, 0), "R(n) e₂": (0, 0.9, 0)}
+    for name, way in names.items():
+        vector = np.array(way)
         axes.quiver(0, 0, 0, *vector, color="0.25", arrow_length_ratio=0.12)
         axes.text(*(1.1 * vector), name, fontsize=11)
     axes.text(*(1.1 * rim[0]), "edge $f_{ij}$", color=BLUE, fontsize=11)

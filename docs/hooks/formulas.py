@@ -1,4 +1,4 @@
-"""Typesets formulas as MathML while the site is built: `$…$` in a line, `$$…$$` on lines of their own.
+"""Typesets formulas as MathML while the site is built: `$…$` in a line, `$$…$$` on its own.
 
 Browsers draw MathML themselves, so pages need neither a script nor fonts nor a network.
 """
