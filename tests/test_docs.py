@@ -9,6 +9,16 @@ import pytest
 from conftest import ROOT
 
 
+def long_if(names):
+    """Paths as parameters; those with one of the names in them take longer."""
+
+    def mark(path):
+        marks = [pytest.mark.long] if any(name in str(path) for name in names) else []
+        return pytest.param(path, marks=marks)
+
+    return lambda paths: [mark(path) for path in paths]
+
+
 def run_blocks(path):
     """Executes the Python blocks of a page, one after the other."""
     scope: dict = {}
@@ -19,7 +29,9 @@ def run_blocks(path):
 @pytest.mark.parametrize(
     "path",
     # That of torch runs where torch is: in tests/extras.
-    [ROOT / "README.md", *sorted(set((ROOT / "docs").glob("*.md")) - {ROOT / "docs/gradient.md"})],
+    long_if(["docs/paper.md", "docs/cluster.md"])(
+        [ROOT / "README.md", *sorted({*(ROOT / "docs").glob("*.md")} - {ROOT / "docs/gradient.md"})]
+    ),
     ids=lambda p: p.name,
 )
 def test_python_blocks_run(path, monkeypatch, tmp_path):
@@ -35,7 +47,11 @@ def test_linked_files_exist():
             assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.py")), ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    long_if(["examples/paper"])(sorted((ROOT / "examples").rglob("*.py"))),
+    ids=lambda p: p.stem,
+)
 def test_examples_run(path, tmp_path):
     result = subprocess.run(
         [sys.executable, path], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -160,6 +160,7 @@ def test_the_outer_wall_is_taken_where_there_are_two():
     assert abs(fit.surface.radius(0.5, 1.0) - 1.0) < 0.005
 
 
+@pytest.mark.long
 def test_all_kinds_of_sources_agree(tmp_path):
     mesh = trimesh.load_mesh(BOTTLE)
     wanted = gm.fit(BOTTLE)
