@@ -129,7 +129,7 @@ def _mesh_hits(local: Floats, faces: NDArray[np.int64], grid: Grid) -> Hits:
     first, last = np.maximum(first, 0), np.minimum(last, grid.rows - 1)
     triangle, offset = _ranges(last - first + 1)
     row = first[triangle] + offset
-    height: Floats = grid.low + (row + 0.5) * step
+    height = grid.low + (row.astype(np.float64) + 0.5) * step
     # Where the plane at this height cuts the triangle's sides.
     tri = corners[triangle]
     above = tri[:, :, 2] >= height[:, None]
