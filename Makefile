@@ -61,8 +61,8 @@ reproduce: $(READY) ## The paper's experiments at the quick scale: report in out
 
 docs: $(READY) ## The documentation site, without a network, in out/site/
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
-	    'mkdocs-material>=9.6' 'mkdocstrings[python]>=0.29'
-	$(BIN)/mkdocs build --quiet
+	    'mkdocs-material>=9.6' 'mkdocstrings[python]>=0.29' 'latex2mathml>=3.77'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 bench: $(READY) ## Speed, side by side with SciPy in one run
 	$(BIN)/python benchmarks/bench.py --markdown docs/benchmarks.md
