@@ -315,8 +315,9 @@ def test_the_command_takes_tips_centres_and_errors(tmp_path):
     for grasp in report["grasps"]:
         assert len(grasp["contacts"]) == len(grasp["checks"]) == 4
         assert grasp["center_of_mass"] == [0, 0, -0.05]
-        assert all(set(check) >= {"distance", "angle", "seen", "clearance", "bearing"}
-                   for check in grasp["checks"])  # fmt: skip
+        for check, u in zip(grasp["checks"], grasp["u"], strict=True):
+            assert set(check) >= {"distance", "angle", "seen", "clearance", "bearing"}
+            assert check["part"] == (None if u is None else 0)
 
 
 def test_a_plate_is_too_thin(tmp_path):

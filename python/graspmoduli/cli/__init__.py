@@ -470,7 +470,11 @@ def _grasp_report(grasp: Any) -> dict[str, Any]:
         report["exact_quality"] = grasp.exact_quality
         report["low_quality"] = grasp.low_quality
         report["held"] = grasp.held
-        report["checks"] = [dataclasses.asdict(check) for check in grasp.checks]
+        report["checks"] = [
+            # The fitted surface is the only part that is known.
+            {**dataclasses.asdict(check), "part": None if u is None else 0}
+            for check, u in zip(grasp.checks, coordinates[0], strict=True)
+        ]
     return report
 
 

@@ -129,14 +129,14 @@ def _mesh_hits(local: Floats, faces: NDArray[np.int64], grid: Grid) -> Hits:
     first, last = np.maximum(first, 0), np.minimum(last, grid.rows - 1)
     triangle, offset = _ranges(last - first + 1)
     row = first[triangle] + offset
-    height = grid.low + (row + 0.5) * step
+    height = grid.low + (row.astype(np.float64) + 0.5) * step
     # Where the plane at this height cuts the triangle's sides.
     tri = corners[triangle]
     above = tri[:, :, 2] >= height[:, None]
     one, two, three = above.T
     # The corner alone on its side of the plane.
     lone = np.where(one == two, 2, np.where(one == three, 1, 0))
-    mixed = (one != two) | (one != three)
+    mixed: Booleans = (one != two) | (one != three)
     triangle, row, height = triangle[mixed], row[mixed], height[mixed]
     tri, lone = tri[mixed], lone[mixed]
     index = np.arange(len(tri))

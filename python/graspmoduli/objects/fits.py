@@ -1,0 +1,481 @@
+"""The fit of a surface to a real object, and grasps in the coordinates of the object."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import (
+    Floats,
+    a_path,
+    brief,
+    coefficient,
+    count,
+    finite,
+    floats,
+    locked,
+    number,
+    vectors,
+)
+from .._batches import Cone, carried, fingers
+from .._core import GraspModuliError
+from .._files import replacing
+from .._values import Value
+from ..grasps import Grasp, PlacedGrasp, a_grasp
+from ..quality import circular_quality, quality
+from ..surfaces import Surface
+from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
+from ..transfers import transfer
+from .object_grasps import ObjectGrasp, by_errors, by_round_cones
+from .reading import read
+from .touching import (
+    TIP,
+    Pressed,
+    Search,
+    TriangleMesh,
+    press,
+    search,
+    tip,
+)
+from .walls import CLOSE, Booleans
+
+#: The version of the files that Fit.save writes.
+FILE_VERSION = 2
+#: Grasps of a mesh of lower quality are force closure, but hold nothing.
+LEAST = 1e-3
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Distance of the object's outer wall from the fitted surface, where it explains the wall."""
+
+    #: Root mean square, in the unit of the object.
+    rms: float
+    #: Largest, in the unit of the object.
+    max: float
+    #: The object's largest extent, in its unit.
+    size: float
+
+    @property
+    def relative_rms(self) -> float:
+        """rms / size."""
+        return self.rms / self.size
+
+    @property
+    def relative_max(self) -> float:
+        """max / size."""
+        return self.max / self.size
+
+
+@dataclass(frozen=True, eq=False)
+class Fit(Value):
+    """A surface fitted to an object."""
+
+    #: The surface, about its own axis, in the unit of the object.
+    surface: Surface
+    #: Rigid motion from the surface's coordinates to the object's. Shape (4, 4).
+    pose: Floats
+    residual: Residual
+    #: Share of the surface's area where there is an object: of a mesh, within 2 % of its size; of a
+    #: cloud, where it was seen, as the rest is filled in smoothly.
+    coverage: float
+    #: Share of the object farther than 2 % of its size from the surface: of a mesh, of the area
+    #: visible from outside, the surface being closed by lids; of a cloud, of its outer wall.
+    unexplained: float
+    #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
+    #: Shape (k, n).
+    allowed: Booleans = field(repr=False)
+    #: The object's mesh, where it came as one: grasps are pressed on it.
+    mesh: TriangleMesh | None = None
+
+    @property
+    def center_of_mass(self) -> Floats:
+        """The object's centre of mass, in its own coordinates. Shape (3,).
+
+        Of a closed mesh that of the solid, its density uniform; of an open one that of its
+        triangles' area; of a cloud of points the fitted surface's z_S.
+        """
+        if self.mesh is not None:
+            return self.mesh.shape.center_of_mass
+        return locked(self.to_object(self.surface.center_of_mass))
+
+    @property
+    def length_scale(self) -> float:
+        """The object's radius about its centre of mass: torques are divided by it for Q_l.
+
+        Of a mesh the largest distance of a vertex; of a cloud of points that of the surface.
+        """
+        return self._surface_radius if self.mesh is None else self.mesh.radius
+
+    @property
+    def _surface_radius(self) -> float:
+        return self.surface.radius_about(self.surface.center_of_mass)
+
+    @property
+    def unit_surface(self) -> Surface:
+        """The surface divided by its radius about its own centre of mass: to compare shapes."""
+        return (1.0 / self._surface_radius) * self.surface
+
+    def synthesize(
+        self,
+        *,
+        contacts: int = 3,
+        torsion: float = 0.0,
+        top: int = 5,
+        friction: ArrayLike = 1.0,
+        edges: int = 8,
+        seed: int = 0,
+        center_of_mass: ArrayLike | None = None,
+        tip_radius: float | None = None,
+        errors: float | None = None,
+    ) -> list[ObjectGrasp]:
+        """Different grasps of high quality in the object's own coordinates, best first.
+
+        Of a mesh, fingertips are pressed on the mesh itself, all over it (:func:`contact_map`):
+        the best of all subsets of the 100 places that are farthest from each other climb over the
+        map and then over the mesh, on pads as flat as four fifths of the best quality allow. What
+        is offered is true: a straight finger from outside lands there, and there is force closure
+        also with the triangles' own normals and for balls of the tip's radius. The first does not
+        lose force closure in 99 of 100 errors of aim of half a tip radius, unless all such grasps
+        are less than half as good.
+
+        Of a cloud of points, :func:`graspmoduli.synthesize` on the fitted surface, with contacts
+        where it explains the cloud or was not seen.
+
+        The order follows the proven bounds for round friction cones, ``round_quality``, or
+        ``low_quality`` if errors are given. Qualities do not depend on the object's unit.
+
+        Parameters
+        ----------
+        contacts
+            Fingers of a grasp; of a cloud of points three.
+        torsion
+            Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
+        top
+            How many grasps are wanted. Fewer come back if fewer are found, none if the object is
+            too thin for these tips or too slippery: on a mesh, qualities below 0.001 do not count.
+        friction, edges
+            As in :func:`graspmoduli.quality`; friction positive, a number or one per finger.
+        seed
+            Of the places on the object.
+        center_of_mass
+            Shape (3,), in the object's coordinates; :attr:`center_of_mass` if not given. That of
+            the paper is ``fit.to_object(fit.surface.center_of_mass)``.
+        tip_radius
+            Of the fingertips, balls, in the object's unit; 5 % of its size if not given.
+        errors
+            Errors of aim, a distance, that grasps should stand: they are ranked by the quality
+            that nine of ten errors leave.
+        """
+        size = count("contacts", contacts, 1, MOST_CONTACTS)
+        many = count("top", top, 1, MOST_FOLLOWED)
+        hand = (*fingers(friction, edges, size)[:2], coefficient("torsion", torsion))
+        start = count("seed", seed, 0)
+        center = self._center(center_of_mass)
+        if self.mesh is None:
+            return self._of_cloud(size, many, hand, start, center, tip_radius, errors)
+        radius = tip(self.mesh, tip_radius)
+        aim = self._errors(errors, 0.5 * radius * self.mesh.size)
+        wanted = Search(hand, center, self.length_scale, size, many, aim)
+        found = search(self.mesh, radius, start, wanted)
+        grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
+        # Equal ones stay in the order of their Q_l.
+        key = by_round_cones if errors is None else by_errors
+        return sorted(grasps, key=key, reverse=True)[:many]
+
+    def _center(self, center_of_mass: ArrayLike | None) -> Floats:
+        if center_of_mass is None:
+            return self.center_of_mass
+        center = finite("center_of_mass", floats("center_of_mass", center_of_mass))
+        if center.shape != (3,):
+            raise GraspModuliError(f"center_of_mass must have shape (3,), got {center.shape}")
+        return center
+
+    def _errors(self, errors: float | None, default: float) -> float:
+        if errors is None:
+            return default
+        wanted = number("errors", errors, positive=True)
+        if wanted > 0.25 * self.residual.size:
+            raise GraspModuliError(
+                f"errors must be at most a quarter of the object's size, "
+                f"{0.25 * self.residual.size:.4g}, got {wanted:g}"
+            )
+        return wanted
+
+    def _of_cloud(
+        self,
+        size: int,
+        top: int,
+        hand: Cone,
+        seed: int,
+        center: Floats,
+        tip_radius: float | None,
+        errors: float | None,
+    ) -> list[ObjectGrasp]:
+        mu, edges, torsion = hand
+        if size != 3 or torsion > 0.0:
+            raise GraspModuliError(
+                "contacts must be 3 and torsion 0 for a cloud of points, "
+                f"got {size} and {torsion:g}; a mesh takes others"
+            )
+        for name, value in (("tip_radius", tip_radius), ("errors", errors)):
+            if value is not None:
+                raise GraspModuliError(
+                    f"{name} must be left out for a cloud of points, got {value:g}: fingertips are "
+                    "pressed on meshes only"
+                )
+        scale = self._surface_radius
+        # Where contacts are not allowed everywhere, more starts find better grasps.
+        found = synthesize(
+            self.unit_surface,
+            top=top,
+            starts=min(2 * top + 6, MOST_FOLLOWED),
+            friction=mu if len(mu) > 1 else mu[0],
+            edges=edges,
+            seed=seed,
+            allowed=self.allowed,
+            center_of_mass=(center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale,
+        )
+        # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in those
+        # of the object differs slightly from the surface's own.
+        grasps = [self._placed(ranked.grasp, hand, center) for ranked in found]
+        return sorted((g for g in grasps if g.quality > 0.0), key=by_round_cones, reverse=True)
+
+    def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
+        """A grasp on the fitted surface, in the object's own coordinates."""
+        a_grasp("grasp", grasp)
+        return self._placed(grasp, fingers(friction, edges, len(grasp)), self.center_of_mass)
+
+    def _placed(self, grasp: Grasp, hand: Cone, center: Floats) -> ObjectGrasp:
+        contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
+        normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
+        return self._object_grasp(grasp, contacts, normals, hand, center)
+
+    def on_surface(self, grasp: ObjectGrasp) -> Grasp:
+        """The grasp's place in G^cyl: contact coordinates of its contacts on the fitted surface.
+
+        Of contacts that are not on it, those of the nearest points of the surface.
+        """
+        if not isinstance(grasp, ObjectGrasp):
+            raise GraspModuliError(f"grasp must be an ObjectGrasp, got {brief(grasp)}")
+        if grasp.grasp is not None:
+            return grasp.grasp
+        local = (grasp.contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
+        u, theta, _ = self.surface.coordinates(local)
+        return Grasp(u, theta)
+
+    def on_mesh(
+        self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
+    ) -> ObjectGrasp:
+        """A grasp as the object's own mesh sees it, not the fitted surface.
+
+        Contacts are the nearest points of the mesh, normals those of its faces there, pointing to
+        the side that the surface's do.
+
+        Parameters
+        ----------
+        mesh
+            As for :func:`fit`, with faces.
+        grasp
+            Contact coordinates on the fitted surface.
+        friction, edges
+            As in :func:`graspmoduli.quality`.
+        """
+        thing = read(mesh)
+        if thing.faces is None:
+            raise GraspModuliError("mesh must have faces, got points only")
+        from trimesh.triangles import closest_point
+
+        flat = self.in_object(grasp, friction=friction, edges=edges)
+        triangles = thing.points[thing.faces]
+        sides = triangles[:, 1:] - triangles[:, :1]
+        across = np.cross(sides[:, 0], sides[:, 1])
+        area = np.linalg.norm(across, axis=1)
+        triangles, across = triangles[area > 0.0], across[area > 0.0] / area[area > 0.0, None]
+        contacts, normals = [], []
+        for point, normal in zip(flat.contacts, flat.normals, strict=True):
+            near = closest_point(triangles, np.broadcast_to(point, (len(triangles), 3)))
+            face = int(((near - point) ** 2).sum(axis=1).argmin())
+            contacts.append(near[face])
+            normals.append(np.where(across[face] @ normal < 0.0, -1.0, 1.0) * across[face])
+        hand = fingers(friction, edges, len(grasp))
+        return self._object_grasp(
+            grasp, np.array(contacts), np.array(normals), hand, self.center_of_mass
+        )
+
+    def transfer_to(
+        self,
+        target: Fit,
+        grasp: Grasp | ObjectGrasp,
+        method: str = "ascent",
+        *,
+        friction: ArrayLike = 1.0,
+        edges: int = 8,
+    ) -> ObjectGrasp:
+        """A grasp of this object carried to another one, in that one's own coordinates.
+
+        :func:`graspmoduli.transfer` between the fitted surfaces, each divided by its
+        radius about its own centre of mass; the ascent offers contacts only where the target is
+        explained by its surface or, of a scan, was not seen. On a target with a mesh the contacts
+        are then pressed on the mesh, where a tip of 5 % of its size touches near them, and climb
+        there; where that leaves nothing true, an error says so.
+        """
+        if not isinstance(target, Fit):
+            raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
+        if isinstance(grasp, ObjectGrasp):
+            grasp = self.on_surface(grasp)
+        start, end = self.unit_surface, target.unit_surface
+        allowed = target.allowed if method == "ascent" else None
+        carried = transfer(
+            start, grasp, end, method, friction=friction, edges=edges, allowed=allowed
+        )
+        arrived = target.in_object(carried.grasp, friction=friction, edges=edges)
+        if target.mesh is None:
+            return arrived
+        hand = fingers(friction, edges, len(grasp))
+        aim = 0.5 * TIP * target.mesh.size
+        wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
+        pressed = press(target.mesh, TIP, arrived.contacts, arrived.normals, wanted)
+        if pressed is None:
+            raise GraspModuliError(
+                "grasp must be one that the target's mesh can be grasped with, got contacts that "
+                f"no tip reaches or that lose force closure there (on its surface Q is "
+                f"{arrived.quality:.3g})"
+            )
+        return target._touched([pressed], wanted)[0]
+
+    def _touched(self, found: list[Pressed], wanted: Search) -> list[ObjectGrasp]:
+        """Grasps pressed on the mesh, with coordinates on the surface where they lie there."""
+        if not found:
+            return []
+        contacts = np.stack([one.contacts for one in found])
+        local = (contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
+        us, thetas, distances = self.surface.coordinates(local)
+        grasps = []
+        for one, u, theta, on in zip(
+            found, us, thetas, distances <= CLOSE * self.residual.size, strict=True
+        ):
+            made = self._object_grasp(
+                Grasp(u, theta) if on.all() else None,
+                one.contacts,
+                one.normals,
+                wanted.hand,
+                wanted.center_of_mass,
+                coordinates=locked(np.where(on[:, None], np.stack([u, theta], axis=1), np.nan)),
+                checks=one.checks,
+                exact_quality=one.exact_quality,
+                held=one.held,
+                low_quality=one.low_quality,
+            )
+            grasps.append(made)
+        return grasps
+
+    def _object_grasp(
+        self,
+        grasp: Grasp | None,
+        contacts: Floats,
+        normals: Floats,
+        hand: Cone,
+        center: Floats,
+        **others: Any,
+    ) -> ObjectGrasp:
+        made = PlacedGrasp(contacts, normals, center)
+        options = {
+            "friction": carried(hand),
+            "edges": hand[1],
+            "length_scale": self.length_scale,
+        }
+        bounds = circular_quality(
+            made, friction=options["friction"], length_scale=options["length_scale"]
+        )
+        if grasp is not None and "coordinates" not in others:
+            others["coordinates"] = locked(np.stack([grasp.u, grasp.theta], axis=1))
+        return ObjectGrasp(
+            made.contacts,
+            made.normals,
+            made.center_of_mass,
+            grasp=grasp,
+            surface=self.surface,
+            quality=quality(made, torsion=hand[2], **options),
+            torsion=hand[2],
+            round_quality=(bounds.lower, bounds.upper),
+            **options,
+            **others,
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the fit as a NumPy ``.npz`` file, whole or not at all."""
+        with replacing(a_path(path)) as temporary, temporary.open("wb") as file:
+            np.savez(
+                file,
+                graspmoduli_fit=FILE_VERSION,
+                coefficients=self.surface.coefficients,
+                heights=[self.surface.bottom, self.surface.top],
+                pose=self.pose,
+                residual=[self.residual.rms, self.residual.max, self.residual.size],
+                shares=[self.coverage, self.unexplained],
+                allowed=self.allowed,
+                **(
+                    {}
+                    if self.mesh is None
+                    else {
+                        "vertices": self.mesh.vertices,
+                        "faces": self.mesh.faces,
+                    }
+                ),
+            )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fit:
+        """Reads what :meth:`save` wrote."""
+        file = a_path(path)
+        try:
+            with file.open("rb") as handle, np.load(handle) as data:
+                version = int(data["graspmoduli_fit"])
+                if version == FILE_VERSION:
+                    bottom, top = data["heights"].tolist()
+                    coverage, unexplained = data["shares"].tolist()
+                    return cls(
+                        surface=Surface.from_coefficients(data["coefficients"], bottom, top),
+                        pose=locked(floats("pose", data["pose"]).reshape(4, 4)),
+                        residual=Residual(*data["residual"].tolist()),
+                        coverage=coverage,
+                        unexplained=unexplained,
+                        allowed=data["allowed"].astype(bool, casting="no"),
+                        mesh=_saved_mesh(data),
+                    )
+        except FileNotFoundError:
+            raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None
+        # NumPy and zipfile raise what they like on files of other kinds.
+        except Exception as error:
+            raise GraspModuliError(
+                f"path must be a file that Fit.save wrote, got {path} ({brief(str(error))})"
+            ) from None
+        raise GraspModuliError(
+            f"path must be a fit's file of version {FILE_VERSION}, got version {version} in {path}"
+        )
+
+    def to_object(self, points: ArrayLike) -> Floats:
+        """Points from the surface's to the object's coordinates. Shape (..., 3)."""
+        given = finite("points", vectors("points", points, "(..., 3)"))
+        return given @ self.pose[:3, :3].T + self.pose[:3, 3]
+
+    def directions_to_object(self, directions: ArrayLike) -> Floats:
+        """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
+        given = finite("directions", vectors("directions", directions, "(..., 3)"))
+        return given @ self.pose[:3, :3].T
+
+
+def _saved_mesh(data: Any) -> TriangleMesh | None:
+    if "vertices" not in data:
+        return None
+    size = float(data["residual"][2])
+    vertices = floats("vertices", data["vertices"]).reshape(-1, 3)
+    faces = data["faces"].astype(np.int64, casting="no").reshape(-1, 3)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise GraspModuliError("faces must be among the vertices")
+    return TriangleMesh(vertices, faces, size)

@@ -1,0 +1,68 @@
+"""Grasps in the coordinates of a real object, and what ranks them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .._arrays import (
+    Floats,
+)
+from ..grasps import Grasp, PlacedGrasp
+from ..surfaces import Surface
+from .touching import (
+    ContactCheck,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectGrasp(PlacedGrasp):
+    """A grasp in the coordinates of a real object.
+
+    Contacts, normals and centre of mass are in the object's coordinates and unit, and the quality
+    is that of torques divided by ``length_scale``. ``gm.quality(best)`` is ``best.quality``, and
+    ``best.wrench_space()`` tells which forces hold against which disturbances.
+
+    On a mesh, contacts are where a fingertip touches it, and normals what the tip feels.
+    """
+
+    #: Contact coordinates on the fitted surface; None if a contact is farther from it than 2 % of
+    #: the object's size, so that the grasp has no place in G^cyl.
+    grasp: Grasp | None
+    #: The fitted surface, in its own coordinates.
+    surface: Surface = field(repr=False)
+    #: Q_l.
+    quality: float
+    #: Friction coefficient, or one per contact.
+    friction: float | tuple[float, ...]
+    #: Edges of the friction cones.
+    edges: int
+    #: Torques are divided by it for the quality.
+    length_scale: float
+    #: Torsional friction coefficient, a length.
+    torsion: float = 0.0
+    #: Proven lower and upper bound of the quality with round friction cones, which does not depend
+    #: on the axes of the file.
+    round_quality: tuple[float, float] | None = None
+    #: Coordinates of each contact on the fitted surface, NaN where it is not on it. Shape (m, 2).
+    coordinates: Floats | None = field(default=None, repr=False)
+    #: What the mesh says of each contact, where there is one.
+    checks: tuple[ContactCheck, ...] | None = field(default=None, repr=False)
+    #: Q_l with the normals of the mesh's own triangles where the contacts are.
+    exact_quality: float | None = None
+    #: Share of combinations of errors of aim under which the grasp is force closure; of half a tip
+    #: radius, or what was asked for.
+    held: float | None = None
+    #: Q_l that nine of ten of these errors leave.
+    low_quality: float | None = None
+
+
+def by_round_cones(grasp: ObjectGrasp) -> float:
+    """What ranks a grasp: what is proven for round cones, or Q_l of soft fingers."""
+    if grasp.torsion > 0.0 or grasp.round_quality is None:
+        return grasp.quality
+    return grasp.round_quality[0]
+
+
+def by_errors(grasp: ObjectGrasp) -> float:
+    """What ranks a grasp under errors of aim."""
+    return 0.0 if grasp.low_quality is None else grasp.low_quality
