@@ -105,7 +105,7 @@ class TestRelatives:
         stable = [part[each > 0.0] for part in grasps]
         q = each[each > 0.0]
         for bar in (0.1, q.max(), np.nextafter(q.max(), 1.0)):
-            at_least = gm.quality_at_least(*stable, bar, norm="each")
+            at_least = gm.quality_at_least(*stable, threshold=bar, norm="each")
             np.testing.assert_array_equal(at_least, q >= bar)
         best = gm.largest_quality(*stable, norm="each")
         worst = gm.smallest_quality(*stable, norm="each")

@@ -200,21 +200,20 @@ class TestBetweenRealObjects:
             for path, target in fits.items():
                 if target is source:
                     continue
-                carried = source.transfer_to(target, best.grasp)
+                carried = source.transfer_to(target, best)
                 assert carried.quality > 0.0
-                real = target.on_mesh(path, carried.grasp)
-                assert real.quality > 0.5 * carried.quality
-                np.testing.assert_array_equal(real.grasp.u, carried.grasp.u)
-                rows, columns = target.allowed.shape
-                cells = (
-                    np.minimum((carried.grasp.u * rows).astype(int), rows - 1),
-                    (carried.grasp.theta / TAU * columns).astype(int),
-                )
-                assert target.allowed[cells].all()
+                assert gm.quality(carried) == carried.quality
+                # Not by the product's own rays: every contact lies on the mesh of the file, with
+                # the normal of the triangle there but for the rounding of edges by a fingertip.
+                mesh = trimesh.load_mesh(path)
+                _, off, face = trimesh.proximity.closest_point(mesh, carried.contacts)
+                assert off.max() < 1e-6 * target.residual.size
+                flat = np.abs((mesh.face_normals[face] * carried.normals).sum(axis=1))
+                assert flat.min() > np.cos(np.radians(35.0))
 
     def test_on_the_mesh_is_on_the_mesh(self, fits):
         path, fit = next(iter(fits.items()))
-        grasp = fit.synthesize(top=1)[0].grasp
+        grasp = gm.synthesize(fit.unit_surface, top=1, allowed=fit.allowed)[0].grasp
         mesh = trimesh.load_mesh(path)
         real = fit.on_mesh(mesh, grasp)
         _, distance, _ = trimesh.proximity.closest_point(mesh, real.contacts)
@@ -232,7 +231,7 @@ class TestBetweenRealObjects:
 
     def test_wrong_input(self, fits):
         fit = next(iter(fits.values()))
-        grasp = fit.synthesize(top=1)[0].grasp
+        grasp = fit.on_surface(fit.synthesize(top=1)[0])
         with pytest.raises(gm.GraspModuliError, match="mesh must have faces"):
             fit.on_mesh(np.random.default_rng(0).random((100, 3)), grasp)
         with pytest.raises(gm.GraspModuliError, match="method must be one of"):
