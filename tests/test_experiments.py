@@ -209,6 +209,7 @@ def piece():
     return deformations.fig8_piece(0, TINY)
 
 
+@pytest.mark.long
 class TestDeformations:
     def test_stay_in_the_ball_that_they_name(self, piece):
         surface = deformations._start()

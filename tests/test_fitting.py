@@ -173,6 +173,7 @@ def test_all_kinds_of_sources_agree(tmp_path):
         np.testing.assert_allclose(gm.fit(source).pose, wanted.pose, atol=1e-9)
 
 
+@pytest.mark.long
 def test_all_kinds_of_point_files_agree(tmp_path):
     points = trimesh.sample.sample_surface(trimesh.load_mesh(BOTTLE), 8000, seed=1)[0]
     points = np.asarray(points)

@@ -37,7 +37,7 @@ class TestNumbers:
         assert value == pytest.approx(0.225299014077, abs=5e-13)
 
     def test_shares_of_uniform_grasps_are_the_published_ones(self):
-        n = 2_000_000
+        n = 1_000_000
         q = gm.quality(*uniform_grasps(n, np.random.default_rng(1)))
 
         def four_sigma(share):
@@ -50,7 +50,7 @@ class TestNumbers:
     def test_where_only_two_contacts_carry_the_quality_is_exactly_0(self, uniform):
         # 3.4 % of uniform grasps have 0 on the boundary of the hull: linear programming finds
         # an equilibrium, but none that uses all wrenches.
-        contacts, normals, centers = (array[:1500] for array in uniform)
+        contacts, normals, centers = (array[:700] for array in uniform)
         q = gm.quality(contacts, normals, centers)
         boundary = 0
         for i in range(len(q)):

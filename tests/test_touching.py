@@ -78,7 +78,7 @@ def test_slippery_fingers(name):
     check(made.vertices, made.faces, name, friction=0.5)
 
 
-@pytest.mark.parametrize("fingers", [4, 5])
+@pytest.mark.parametrize("fingers", [4, pytest.param(5, marks=pytest.mark.long)])
 def test_more_fingers_hold_better(fingers):
     made = objects_made.bottle()
     best = check(made.vertices, made.faces, "bottle", contacts=fingers, top=2)[0]

@@ -526,9 +526,10 @@ def _words(fit: Any, grasps: Any) -> list[str]:
         angle = math.degrees(max(check.angle for check in checks))
         bearing = min(check.bearing for check in checks)
         held = min(grasp.held for grasp in grasps)
+        share = "all" if held == 1.0 else f"at least {held:.0%}"
         words.append(
             f"Every contact lies on the mesh: the normals felt differ from its triangles' by at "
-            f"most {angle:.0f}°, at least {bearing:.0%} of each pad bears, and at least {held:.0%} "
+            f"most {angle:.0f}°, at least {bearing:.0%} of each pad bears, and {share} "
             "of the errors of aim that were tried leave a grasp in force closure."
         )
     return words
