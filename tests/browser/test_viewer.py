@@ -154,8 +154,7 @@ def test_a_slider_changes_the_quality(browser, served, found):
     friction.press("Enter")
     friction.blur()
     wait(lambda: window.quality() != before)
-    fit, best = found[1], found[2][0]
-    wanted = fit.in_object(best.grasp, friction=0.5).quality
+    wanted = gm.quality(found[2][0], friction=0.5)
     wait(lambda: window.quality() == pytest.approx(wanted, abs=1e-4))
     assert pages[-1].friction.value == 0.5
     window.page.close()
@@ -165,6 +164,8 @@ def test_a_drag_moves_a_contact_along_the_surface(browser, served):
     address, pages = served
     window = ready(Window(browser, address))
     page = pages[-1]
+    # On the fitted surface, where a drag moves contacts.
+    page.show(page.grasp)
     eye = np.asarray(page.client.camera.position)
     placed = gm.place(page.surface, page.grasp)
     # The contact that faces the eye most.
@@ -217,7 +218,7 @@ def test_the_ascent_climbs(browser, served, found):
     address, pages = served
     window = ready(Window(browser, address))
     page = pages[-1]
-    best = found[2][0].grasp
+    best = found[1].on_surface(found[2][0])
     worse = gm.Grasp(0.9 * best.u + 0.05, best.theta + np.array([0.0, 0.3, 0.0]))
     page.show(worse)
     start = found[1].in_object(worse).quality
@@ -235,10 +236,13 @@ def test_the_ascent_never_ends_lower_than_it_starts(served, browser, found):
     for ranked in found[2]:
         for friction in (0.3, 1.0):
             page.friction.value = friction
-            start = fit.in_object(ranked.grasp, friction=friction).quality
-            page.show(ranked.grasp)
-            page.climb()
-            assert fit.in_object(page.grasp, friction=friction).quality >= start
+            grasp = fit.on_surface(ranked)
+            # As it was offered, on the mesh, and from the fitted surface.
+            for offered in (ranked, None):
+                page.show(grasp, offered)
+                start = page._worth(grasp, offered)
+                page.climb()
+                assert page._worth(page.grasp, page.offered) >= start
     window.page.close()
 
 
@@ -254,7 +258,7 @@ def test_any_friction_and_edges_are_those_that_are_asked_for(browser, found, fri
     window = Window(browser, f"http://127.0.0.1:{server.get_port()}")
     window.page.wait_for_selector("[data-quality]", timeout=60_000)
     assert (pages[0].friction.value, pages[0].edges.value) == (friction, edges)
-    wanted = found[1].in_object(found[2][0].grasp, friction=friction, edges=edges).quality
+    wanted = gm.quality(found[2][0], friction=friction, edges=edges)
     wait(lambda: window.quality() == pytest.approx(wanted, abs=1e-4))
     assert window.errors == []
     window.page.close()

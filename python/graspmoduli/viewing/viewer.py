@@ -234,6 +234,8 @@ class GraspPage:
         self.client, self.fit, self.grasps = client, fit, grasps
         self.surface = (1.0 / fit.length_scale) * fit.surface
         self.grasp = fit.on_surface(grasps[0]) if grasps else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
+        #: The grasp as it was offered, with its contacts on the object; None once it was changed.
+        self.offered = grasps[0] if grasps else None
         self.lock = threading.RLock()
         self.climbing = False
         scene, gui = client.scene, client.gui
@@ -271,11 +273,11 @@ class GraspPage:
         def choose(_: Any) -> None:
             if self.grasps:
                 chosen = self.grasps[min(int(self.rank.value), len(self.grasps)) - 1]
-                self.show(fit.on_surface(chosen))
+                self.show(fit.on_surface(chosen), chosen)
 
         self.rank.on_update(choose)
-        self.friction.on_update(lambda _: self.show(self.grasp))
-        self.edges.on_update(lambda _: self.show(self.grasp))
+        self.friction.on_update(lambda _: self.show(self.grasp, self.offered))
+        self.edges.on_update(lambda _: self.show(self.grasp, self.offered))
         climb.on_click(lambda _: self.climb())
 
         @shown.on_update
@@ -291,7 +293,7 @@ class GraspPage:
             self.object.visible = shown.value and not colored.value
             self.paint(colored.value)
 
-        self.show(self.grasp)
+        self.show(self.grasp, self.offered)
 
     def _dragger(self, index: int) -> Callable[[Any], None]:
         def dragged(event: Any) -> None:
@@ -304,25 +306,26 @@ class GraspPage:
 
         return dragged
 
-    def show(self, grasp: Grasp) -> None:
-        """Draws a grasp and says what it is worth."""
+    def show(self, grasp: Grasp, offered: ObjectGrasp | None = None) -> None:
+        """Draws a grasp and says what it is worth: as it was offered, or on the fitted surface."""
         with self.lock, self.client.atomic():
-            self.grasp = grasp
+            self.grasp, self.offered = grasp, offered
             mu, l = float(self.friction.value), int(self.edges.value)
-            placed = place(self.surface, grasp)
+            real = offered or self.fit.in_object(grasp, friction=mu, edges=l)
+            turn, middle = self.fit.pose[:3, :3], self.fit.pose[:3, 3]
+            contacts = (real.contacts - middle) @ turn / self.fit.length_scale
+            normals = real.normals @ turn
             for index, sphere in enumerate(self.spheres):
-                point, normal = placed.contacts[index], placed.normals[index]
+                point, normal = contacts[index], normals[index]
                 sphere.position = point
                 draw_finger(self.client.scene, index, point, normal, mu, l)
-            real = self.fit.in_object(grasp, friction=mu, edges=l)
             scale = real.length_scale
             weakest = WrenchSpace(
                 real.contacts / scale, real.normals, real.center_of_mass / scale,
                 friction=mu, edges=l,
             ).weakest  # fmt: skip
-            turn = self.fit.pose[:3, :3]
             push, twist = weakest[:3] @ turn, weakest[3:] @ turn
-            center = placed.center_of_mass
+            center = (real.center_of_mass - middle) @ turn / self.fit.length_scale
             length = float(np.linalg.norm(push))
             # Long enough to come out of the object; a pure torque has no arrow.
             tip = center + 1.2 * push / max(length, 1e-9)
@@ -330,11 +333,14 @@ class GraspPage:
                 "/weakest", np.stack([center, tip])[None], (20, 20, 20),
                 shaft_radius=0.012, head_radius=0.035, head_length=0.08, visible=length > 0.05,
             )  # fmt: skip
-            self.text.content = numbers(real.quality, l, scale, push, twist)
+            worth = self._worth(grasp, offered)
+            self.text.content = numbers(worth, l, scale, push, twist)
 
-    def _worth(self, grasp: Grasp) -> float:
+    def _worth(self, grasp: Grasp, offered: ObjectGrasp | None = None) -> float:
         """Q_l that is shown of a grasp."""
         mu, l = float(self.friction.value), int(self.edges.value)
+        if offered is not None:
+            return quality(offered, friction=mu, edges=l)
         return self.fit.in_object(grasp, friction=mu, edges=l).quality
 
     def climb(self) -> None:
@@ -344,7 +350,7 @@ class GraspPage:
                 return
             self.climbing = True
         try:
-            best = self._worth(self.grasp)
+            best = self._worth(self.grasp, self.offered)
             for _ in range(120):
                 mu, l = float(self.friction.value), int(self.edges.value)
                 moved = transfer(
