@@ -1,10 +1,15 @@
 """Shared fixtures."""
 
 import os
+import signal
 from pathlib import Path
 
 # The tests run side by side; threads of BLAS would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# A shell ignores Ctrl-C for what it starts in the background, and so would the commands that
+# the tests start and interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import numpy as np
 import pytest
