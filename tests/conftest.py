@@ -7,14 +7,14 @@ from pathlib import Path
 # The tests run side by side; threads of BLAS would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# A shell ignores Ctrl-C for what it starts in the background, and so would the commands that
-# the tests start and interrupt.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).parent.parent
+
+# A shell ignores Ctrl-C for what it starts in the background, and so would the commands that
+# the tests start and interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def uniform_grasps(n, rng, m=3):
@@ -34,6 +34,14 @@ def uniform_grasps(n, rng, m=3):
 def uniform():
     """200,000 uniform grasps."""
     return uniform_grasps(200_000, np.random.default_rng(20130624))
+
+
+def quick(values, names):
+    """Parameters of a test, of which only those that are named run with the quick tests."""
+    marks = [
+        [] if str(getattr(value, "stem", value)) in names else pytest.mark.long for value in values
+    ]
+    return [pytest.param(value, marks=mark) for value, mark in zip(values, marks, strict=True)]
 
 
 def objects():

@@ -29,7 +29,7 @@ def run_blocks(path):
 @pytest.mark.parametrize(
     "path",
     # That of torch runs where torch is: in tests/extras.
-    long_if(["docs/paper.md", "docs/cluster.md"])(
+    long_if(["paper.md", "cluster.md", "transfer.md", "object.md"])(
         [ROOT / "README.md", *sorted({*(ROOT / "docs").glob("*.md")} - {ROOT / "docs/gradient.md"})]
     ),
     ids=lambda p: p.name,
@@ -49,7 +49,9 @@ def test_linked_files_exist():
 
 @pytest.mark.parametrize(
     "path",
-    long_if(["examples/paper"])(sorted((ROOT / "examples").rglob("*.py"))),
+    long_if(["examples/paper", "02_own", "03_family", "04_transfer"])(
+        sorted((ROOT / "examples").rglob("*.py"))
+    ),
     ids=lambda p: p.stem,
 )
 def test_examples_run(path, tmp_path):

@@ -342,7 +342,7 @@ import os, signal, sys, threading
 import numpy as np
 import graspmoduli as gm
 
-points = np.random.default_rng(0).normal(size=(400_000, 4, 3))
+points = np.random.default_rng(0).normal(size=(400_000, 8, 3))
 normals = points / np.linalg.norm(points, axis=-1, keepdims=True)
 e, f = (gm.shapes.MODELS[name] for name in "ef")
 grasp = gm.Grasp([0.5, 0.5, 0.5], [0, 2, 4])
@@ -356,7 +356,7 @@ calls = {
     "ascent": lambda: gm.transfer(e, [grasp] * 5000, f, "ascent"),
     "distance": lambda: [gm.surface_distance(e, f, tolerance=1e-9) for _ in range(10_000)],
 }
-threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
     calls[sys.argv[1]]()
 except KeyboardInterrupt:
