@@ -1,6 +1,7 @@
 """Q_l and its relatives: published numbers, twins, invariants, degenerate and wrong input."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -141,6 +142,28 @@ class TestRelatives:
             assert (bounds.lower <= outside + 1e-12).all()
             assert (bounds.upper - bounds.lower <= 1e-3 * bounds.upper).all()
             assert not np.isnan(bounds.value).any()
+
+    @pytest.mark.parametrize("norm", ["sum", "each"])
+    @pytest.mark.parametrize("torsion", [0.0, 0.3])
+    def test_so_they_do_for_any_fingers(self, norm, torsion):
+        rng = np.random.default_rng(7)
+        for m in (2, 3, 4):
+            grasps = uniform_grasps(60, rng, m)
+            hand: Any = {"torsion": torsion, "norm": norm}
+            bounds = gm.circular_quality(*grasps, friction=0.8, tolerance=1e-2, **hand)
+            inner = gm.quality(*grasps, friction=0.8, edges=40, **hand)
+            outer = gm.quality(*grasps, friction=0.8 / np.cos(np.pi / 40), edges=40, **hand)
+            assert (bounds.upper - bounds.lower <= 0.01 * bounds.upper + 1e-12).all()
+            assert (inner <= bounds.upper + 1e-9).all()
+            assert (bounds.lower <= outer + 1e-9).all()
+            assert ((inner > 0) <= (bounds.upper > 0)).all()
+            if m > 2 or torsion > 0:
+                assert (inner > 0).any()
+
+    def test_the_gradient_of_many_fingers_with_limits_is_refused(self):
+        many = uniform_grasps(1, np.random.default_rng(0), 17)
+        with pytest.raises(gm.GraspModuliError, match=r"at most 16 .* got 17"):
+            gm.quality_gradient(*many, norm="each")
 
     def test_circular_cones_do_not_depend_on_the_axes(self):
         contacts, normals, centers = uniform_grasps(40, np.random.default_rng(24))
@@ -288,7 +311,16 @@ class TestGradient:
             assert kink.mean() < 0.02
         assert wrong == 0
 
-    @pytest.mark.parametrize("options", [{}, {"torsion": 0.1}, {"edges": 5, "friction": 0.6}])
+    @pytest.mark.parametrize(
+        "options",
+        [
+            {},
+            {"torsion": 0.1},
+            {"edges": 5, "friction": 0.6},
+            {"norm": "each"},
+            {"norm": "each", "torsion": 0.2, "edges": 6},
+        ],
+    )
     @pytest.mark.parametrize("m", [2, 3, 4, 6])
     def test_is_that_of_finite_differences_for_any_hand(self, m, options):
         rng = np.random.default_rng(m)

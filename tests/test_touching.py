@@ -99,6 +99,16 @@ def test_two_soft_fingers_hold():
     assert not fit.synthesize(contacts=2, top=1)
 
 
+def test_fingers_with_a_limit_each_hold_more():
+    fit = quiet_fit(objects_made.bottle())
+    best = fit.synthesize(norm="each", top=1)[0]
+    assert best.norm == "each"
+    assert gm.quality(best) == best.quality
+    assert best.quality > fit.synthesize(top=1)[0].quality
+    assert best.round_quality is not None
+    assert best.round_quality[0] <= 1.2 * best.quality
+
+
 def test_fingers_that_differ_go_where_they_are_best():
     fit = quiet_fit(objects_made.bottle())
     mu = [0.4, 1.0, 0.8]

@@ -136,7 +136,7 @@ class TestTransfer:
 
     def test_finite_differences_follow_exact_derivatives(self, grasps):
         arguments = MODELS["f"], grasps["f"], MODELS["k"], "gradient"
-        options = {"surfaces": 20, "steps": 5}
+        options: Any = {"surfaces": 20, "steps": 5}
         exact = gm.transfer(*arguments, **options)
         finite = gm.transfer(*arguments, difference=1e-6, **options)
         np.testing.assert_allclose(finite.path, exact.path, atol=2e-3)

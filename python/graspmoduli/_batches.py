@@ -29,15 +29,16 @@ from ._core import GraspModuliError
 FARTHEST = 1e60
 
 
-#: Friction coefficients, one for all contacts or one each; edges; torsion.
-Cone = tuple[list[float], int, float]
+#: Friction coefficients, one for all contacts or one each; edges; torsion; whether every finger has
+#: a limit of its own, as ``norm="each"`` says.
+Cone = tuple[list[float], int, float, bool]
 
 
 class GraspLike(Protocol):
     """A grasp of the library: what :func:`graspmoduli.place` and the finders of grasps return.
 
-    Where it also has ``friction``, ``edges``, ``torsion`` or ``length_scale``, it is evaluated with
-    these unless the caller says otherwise.
+    Where it also has ``friction``, ``edges``, ``torsion``, ``length_scale`` or ``norm``, it is
+    evaluated with these unless the caller says otherwise.
     """
 
     @property
@@ -53,7 +54,7 @@ class Batch(NamedTuple):
 
     #: (n, m, 3), (n, m, 3), (n, 3) and, where contacts differ in friction, (n, m).
     arrays: tuple[Floats, Floats, Floats, Floats | None]
-    #: Friction of all contacts (of the first where they differ), edges, torsion.
+    #: Friction of all contacts (of the first where they differ), edges, torsion, norm.
     cone: Cone
     #: The shape of the batch.
     shape: tuple[int, ...]
@@ -75,15 +76,16 @@ def batch(
     edges: Any = None,
     torsion: Any = None,
     length_scale: Any = None,
+    norm: Any = None,
 ) -> Batch:
     """Everything that is asked about grasps, checked and broadcast."""
     several = _several(contacts)
     if several is not None or _is_grasp(contacts):
         own = _stacked(several) if several is not None else _of_grasp(contacts)
-        contacts, normals, center_of_mass, friction, edges, torsion, length_scale = (
+        contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm = (
             mine if given is None else given
             for given, mine in zip(
-                (None, normals, center_of_mass, friction, edges, torsion, length_scale),
+                (None, normals, center_of_mass, friction, edges, torsion, length_scale, norm),
                 own,
                 strict=True,
             )
@@ -150,7 +152,7 @@ def batch(
     one = float(mu.flat[0]) if mu.size else FRICTION
     return Batch(
         (flat(points, (m, 3)), flat(directions, (m, 3)), flat(center, (3,)), each),
-        ([one], l, spin),
+        ([one], l, spin, is_each(norm)),
         shape,
         flat(scale, ()) if scale.ndim else scale,
         given,
@@ -181,17 +183,38 @@ def frictions_of(friction: ArrayLike | None, m: int, *, positive: bool = False) 
     return mu
 
 
-def fingers(friction: ArrayLike, edges: Any, m: int, torsion: Any = 0.0) -> Cone:
+#: What ``norm`` may be: the normal forces of all fingers sum to at most 1, or each is at most 1.
+NORMS = ("sum", "each")
+
+
+def is_each(norm: Any) -> bool:
+    """Has every finger a limit of its own? Not unless the caller or the grasp says so."""
+    if norm is not None and (not isinstance(norm, str) or norm not in NORMS):
+        raise GraspModuliError(f'norm must be "sum" or "each", got {brief(norm)}')
+    return norm == "each"
+
+
+def fingers(friction: ArrayLike, edges: Any, m: int, torsion: Any = 0.0, norm: Any = None) -> Cone:
     """The cones of a hand that looks for a grasp: friction positive, a number or one per finger."""
     mu = frictions_of(friction, m, positive=True)
     if mu.ndim != 1:
         raise GraspModuliError(f"friction must be a number or have shape ({m},), got {mu.shape}")
-    return mu.tolist(), edges_of(edges), coefficient("torsion", torsion)
+    return mu.tolist(), edges_of(edges), coefficient("torsion", torsion), is_each(norm)
 
 
 def carried(cone: Cone) -> float | tuple[float, ...]:
     """The friction of a cone as grasps carry it."""
     return cone[0][0] if len(set(cone[0])) == 1 else tuple(cone[0])
+
+
+def evaluated_with(hand: Cone) -> dict[str, Any]:
+    """What a hand's grasps are evaluated with, as arguments and as grasps carry it."""
+    return {
+        "friction": carried(hand),
+        "edges": hand[1],
+        "torsion": hand[2],
+        "norm": NORMS[hand[3]],
+    }
 
 
 def _check_reach(points: Floats, center: Floats, spin: float) -> None:
@@ -219,11 +242,12 @@ def _several(value: Any) -> Sequence[Any] | None:
 
 
 #: The arguments of :func:`batch`.
-Arguments = tuple[Any, Any, Any, Any, Any, Any, Any]
+Arguments = tuple[Any, Any, Any, Any, Any, Any, Any, Any]
 
 
 def _of_grasp(grasp: Any) -> Arguments:
-    options = (getattr(grasp, n, None) for n in ("friction", "edges", "torsion", "length_scale"))
+    names = ("friction", "edges", "torsion", "length_scale", "norm")
+    options = (getattr(grasp, name, None) for name in names)
     return (grasp.contacts, grasp.normals, grasp.center_of_mass, *options)  # type: ignore[return-value]
 
 
@@ -232,9 +256,11 @@ def _stacked(grasps: Sequence[Any]) -> Arguments:
     sizes = {len(contacts) for contacts in parts[0]}
     if len(sizes) > 1:
         raise GraspModuliError(f"grasps must have as many contacts each, got {sorted(sizes)}")
-    for name, values in zip(("edges", "torsion"), (parts[4], parts[5]), strict=True):
+    named = zip(("edges", "torsion", "norm"), (parts[4], parts[5], parts[7]), strict=True)
+    for name, values in named:
         if len(set(values)) > 1:
-            raise GraspModuliError(f"grasps must have the same {name}, got {sorted(set(values))}")
+            several = sorted(set(values), key=str)
+            raise GraspModuliError(f"grasps must have the same {name}, got {several}")
     m = sizes.pop()
     frictions = [np.broadcast_to(frictions_of(mu, m), (m,)) for mu in parts[3]]
     scales = [1.0 if scale is None else scale for scale in parts[6]]
@@ -244,6 +270,7 @@ def _stacked(grasps: Sequence[Any]) -> Arguments:
         parts[4][0],
         parts[5][0],
         np.array(scales),
+        parts[7][0],
     )  # type: ignore[return-value]
 
 

@@ -312,11 +312,11 @@ def _starts(s: Setting, seed: int) -> Trial:
     k = len(c)
     if not k:
         return Trial(c, n, z, np.zeros((0, 6)), z, z, np.zeros(0))
-    kernel = [s.friction], edges, 0.0
+    kernel = [s.friction], edges, 0.0, False
 
     def weakest(i: int) -> list[float]:
         row = slice(i, i + 1)
-        return _core.weakest((c[row], n[row], z[row], None), kernel, False)[1]
+        return _core.weakest((c[row], n[row], z[row], None), kernel)[1]
 
     twists = np.array([weakest(i) for i in range(k)])
     trials = []

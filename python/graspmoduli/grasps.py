@@ -150,6 +150,8 @@ class RankedGrasp(PlacedGrasp):
     length_scale: float
     #: Torsional friction of soft fingers, a length; 0 for hard ones.
     torsion: float = field(default=0.0, kw_only=True)
+    #: What a unit of strength means: ``"sum"`` or ``"each"``, as in :func:`graspmoduli.quality`.
+    norm: str = field(default="sum", kw_only=True)
 
 
 @overload

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, brief, locked, number
+from ._arrays import Floats, locked, number
 from ._batches import Batch, GraspLike, batch
 from ._core import GraspModuliError
 from ._values import Value
 
-#: What ``norm`` may be: the normal forces of all fingers sum to at most 1, or each is at most 1.
-NORMS = ("sum", "each")
+#: Most contacts for which there is a gradient where every finger has a limit of its own.
+MOST_EACH = 16
 
 
 @overload
@@ -32,7 +32,7 @@ def quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: ArrayLike | None = None,
 ) -> Any: ...
 
@@ -46,7 +46,7 @@ def quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: float | None = None,
 ) -> float: ...
 
@@ -59,7 +59,7 @@ def quality(
     friction: Any = None,
     edges: Any = None,
     torsion: Any = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: Any = None,
 ) -> Any:
     """Exact grasp quality Q_l.
@@ -141,9 +141,8 @@ def quality(
     )
     if value is not None:
         return value
-    each = _is_each(norm)
-    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
-    return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, each))
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
+    return grasps.shaped(_core.quality(grasps.arrays, grasps.cone))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +167,7 @@ def quality_gradient(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
+    norm: str | None = None,
     length_scale: ArrayLike | None = None,
 ) -> QualityGradient:
     """Exact gradient of Q_l with respect to contacts, normals and centre of mass.
@@ -181,7 +181,8 @@ def quality_gradient(
     generalised gradient, the convex hull of the limits of gradients nearby. Where Q = 0 all
     derivatives are 0, which is the gradient inside of the set {Q = 0} and an element of the
     generalised one on its boundary. Where a normal is −e₃ the contact frame is not continuous, and
-    the motion of its tangents is left out.
+    the motion of its tangents is left out. With ``norm="each"``, for up to 16 contacts, the foot
+    point is a sum over the fingers, Σ_j α_ij = 1 for each finger i that presses.
 
     Examples
     --------
@@ -192,8 +193,13 @@ def quality_gradient(
     >>> slope.contacts.shape, slope.center_of_mass.shape
     ((3, 3), (3,))
     """
-    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
     m, shape = grasps.arrays[0].shape[1], grasps.shape
+    if grasps.cone[3] and m > MOST_EACH:
+        raise GraspModuliError(
+            f'contacts must be at most {MOST_EACH} per grasp for the gradient with norm "each", '
+            f"got {m}"
+        )
     rows = _core.quality_gradient(grasps.arrays, grasps.cone)
     found, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
     # The kernel's derivatives are by lengths over the length scale.
@@ -215,13 +221,13 @@ def quality_at_least(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: ArrayLike | None = None,
 ) -> Any:
     """Is Q_l ≥ ``threshold``?
 
     The same as comparing :func:`quality`, whose arguments and errors it shares, but each grasp is
-    given up as soon as the answer is known (with ``norm="sum"``). A bool for a single grasp, else
+    given up as soon as the answer is known. A bool for a single grasp, else
     shape (...).
 
     Examples
@@ -233,9 +239,7 @@ def quality_at_least(
     True
     """
     bar = number("threshold", threshold)
-    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
-    if _is_each(norm):
-        return grasps.shaped(_core.quality(grasps.arrays, grasps.cone, True) >= bar)
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
     return grasps.shaped(_core.quality_at_least(grasps.arrays, grasps.cone, bar))
 
 
@@ -257,13 +261,13 @@ def largest_quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The best of a batch of grasps by Q_l, the first among equals.
 
     The same as the maximum of :func:`quality`, whose arguments and errors it shares, but a grasp
-    is given up as soon as it is known to be worse than the best so far (with ``norm="sum"``).
+    is given up as soon as it is known to be worse than the best so far.
 
     Examples
     --------
@@ -273,8 +277,8 @@ def largest_quality(
     >>> bool(best.quality == gm.quality(some).max())
     True
     """
-    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
-    return _extreme(grasps, _is_each(norm), largest=True)
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
+    return _extreme(grasps, largest=True)
 
 
 def smallest_quality(
@@ -285,13 +289,13 @@ def smallest_quality(
     friction: ArrayLike | None = None,
     edges: int | None = None,
     torsion: float | None = None,
-    norm: str = "sum",
+    norm: str | None = None,
     length_scale: ArrayLike | None = None,
 ) -> Extreme:
     """The worst of a batch of grasps by Q_l, the first among equals.
 
     The same as the minimum of :func:`quality`, whose arguments and errors it shares, but a grasp
-    is given up as soon as it is known not to be worse than the worst so far (with ``norm="sum"``).
+    is given up as soon as it is known not to be worse than the worst so far.
 
     Examples
     --------
@@ -299,23 +303,12 @@ def smallest_quality(
     >>> gm.smallest_quality(gm.sample_configurations(1000, seed=0)).quality
     0.0
     """
-    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
-    return _extreme(grasps, _is_each(norm), largest=False)
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
+    return _extreme(grasps, largest=False)
 
 
-def _is_each(norm: Any) -> bool:
-    if not isinstance(norm, str) or norm not in NORMS:
-        raise GraspModuliError(f'norm must be "sum" or "each", got {brief(norm)}')
-    return norm == "each"
-
-
-def _extreme(grasps: Batch, each: bool, *, largest: bool) -> Extreme:
-    if each and len(grasps.arrays[2]):
-        values = _core.quality(grasps.arrays, grasps.cone, True)
-        first = int(values.argmax() if largest else values.argmin())
-        found = first, float(values[first])
-    else:
-        found = _core.extreme_quality(grasps.arrays, grasps.cone, largest)
+def _extreme(grasps: Batch, *, largest: bool) -> Extreme:
+    found = _core.extreme_quality(grasps.arrays, grasps.cone, largest)
     if found is None:
         raise GraspModuliError(
             f"contacts must hold at least one grasp, got a batch of shape {grasps.shape}"
@@ -346,19 +339,21 @@ def circular_quality(
     center_of_mass: ArrayLike | None = None,
     *,
     friction: ArrayLike | None = None,
+    torsion: float | None = None,
+    norm: str | None = None,
     tolerance: float = 1e-3,
     length_scale: ArrayLike | None = None,
 ) -> Bounds:
-    """The quality with exact, circular friction cones instead of polygonal ones, of hard fingers.
+    """The quality with exact, circular friction cones instead of polygonal ones.
 
     Arguments and errors are those of :func:`quality`. The hull has no finite set of corners, so
     the answer is a lower and an upper bound, see ``value`` of the result. Both are proven but for
     rounding; where the origin is not in the interior, as :func:`quality` defines it, both are 0.
-    Unlike Q_l they do not depend on the coordinates' axes. The torsion of a soft grasp is left out.
+    Unlike Q_l they do not depend on the coordinates' axes.
 
     Parameters
     ----------
-    contacts, normals, center_of_mass, friction, length_scale
+    contacts, normals, center_of_mass, friction, torsion, norm, length_scale
         As in :func:`quality`.
     tolerance
         The bounds are driven to within this of each other, relative to the upper one; from 1e-6
@@ -376,7 +371,7 @@ def circular_quality(
     wanted = number("tolerance", tolerance)
     if not 1e-6 <= wanted <= 1.0:
         raise GraspModuliError(f"tolerance must lie in [1e-6, 1], got {wanted}")
-    grasps = batch(contacts, normals, center_of_mass, friction, None, 0.0, length_scale)
+    grasps = batch(contacts, normals, center_of_mass, friction, None, torsion, length_scale, norm)
     rows = _core.circular_quality(grasps.arrays, grasps.cone, wanted)
     lower, upper = (grasps.shaped(column.copy()) for column in rows.T)
     for bound in (lower, upper):

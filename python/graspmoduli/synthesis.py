@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, a_callback, cells, coordinates, cores, count, floats
-from ._batches import Cone, carried, fingers, frictions_of
+from ._batches import Cone, evaluated_with, fingers, frictions_of
 from ._core import GraspModuliError
 from .grasps import Grasp, RankedGrasp, a_surface, place
 from .quality import largest_quality, quality
@@ -34,6 +34,7 @@ def best_grasps(
     friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    norm: str = "sum",
     center_of_mass: ArrayLike | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -56,6 +57,8 @@ def best_grasps(
     torsion
         As in :func:`graspmoduli.quality`: above 0 the fingers are soft, such as the two pads of a
         parallel jaw.
+    norm
+        As in :func:`graspmoduli.quality`: ``"each"`` where every finger has a limit of its own.
     center_of_mass
         Shape (3,); the surface's own z_S if not given.
     threads
@@ -94,7 +97,7 @@ def best_grasps(
         raise GraspModuliError(
             f"friction must be a number or have shape ({us.size},), got {each.shape}"
         )
-    hand = fingers(each[0], edges, size, torsion)
+    hand = fingers(each[0], edges, size, torsion, norm)
     top = count("top", top, 1, MOST_RANKED)
     workers = cores() if threads is None else count("threads", threads, 1, MOST_THREADS)
     a_callback("progress", progress)
@@ -233,20 +236,16 @@ def ranked_grasp(
 ) -> RankedGrasp:
     """A grasp that was found, with its quality as every other function will see it."""
     placed = place(surface, grasp)
-    friction, edges, torsion = carried(hand), hand[1], hand[2]
+    options = evaluated_with(hand)
     return RankedGrasp(
         contacts=placed.contacts,
         normals=placed.normals,
         center_of_mass=np.array(center),
         grasp=grasp,
         surface=surface,
-        quality=quality(
-            placed, center_of_mass=center, friction=friction, edges=edges, torsion=torsion
-        ),
-        friction=friction,
-        edges=edges,
+        quality=quality(placed, center_of_mass=center, **options),
         length_scale=1.0,
-        torsion=torsion,
+        **options,
     )
 
 

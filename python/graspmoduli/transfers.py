@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, brief, cells, count, locked, number
-from ._batches import Cone, carried, fingers
+from ._batches import NORMS, Cone, carried, fingers
 from ._core import GraspModuliError, cos, sin
 from ._values import Value
 from .grasps import Grasp, RankedGrasp, a_grasp, a_point, a_surface, place
@@ -64,6 +64,7 @@ def transfer(
     friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    norm: str = "sum",
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -79,6 +80,7 @@ def transfer(
     friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    norm: str = "sum",
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -95,6 +97,7 @@ def transfer(
     friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    norm: str = "sum",
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -110,6 +113,7 @@ def transfer(
     friction: ArrayLike = 1.0,
     edges: int = 8,
     torsion: float = 0.0,
+    norm: str = "sum",
     surfaces: int = 100,
     steps: int = 20,
     step_length: float = 1e-3,
@@ -136,6 +140,8 @@ def transfer(
         As in :func:`graspmoduli.quality`; friction positive, a number or one per finger, (m,).
     torsion
         As in :func:`graspmoduli.quality`: soft fingers, which the ascent does not know.
+    norm
+        As in :func:`graspmoduli.quality`; for the ascent ``"sum"``.
     surfaces
         N₁; for the naïve transfer, how finely its quality is sampled.
     steps, step_length
@@ -189,11 +195,14 @@ def transfer(
     for other in grasps[1:]:
         same_number(grasps[0], other)
     m = len(grasps[0]) if grasps else 3
-    hand = fingers(friction, edges, m, torsion)
+    hand = fingers(friction, edges, m, torsion, norm)
     if method == "ascent" and m != 3:
         raise GraspModuliError(f'method "ascent" is for grasps of three contacts, got {m}')
-    if method == "ascent" and hand[2] > 0.0:
-        raise GraspModuliError(f'method "ascent" is for hard fingers, got torsion {hand[2]:g}')
+    if method == "ascent" and (hand[2] > 0.0 or hand[3]):
+        raise GraspModuliError(
+            'method "ascent" is for hard fingers whose forces add up, '
+            f'got torsion {hand[2]:g} and norm "{NORMS[hand[3]]}"'
+        )
     region = cells(allowed)
     if region is not None and method != "ascent":
         raise GraspModuliError(f'allowed is for method "ascent", got method {method!r}')

@@ -120,14 +120,16 @@ class WrenchSpace:
         torsion: float | None = None,
         length_scale: float | None = None,
     ) -> None:
-        grasp = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale)
+        grasp = batch(
+            contacts, normals, center_of_mass, friction, edges, torsion, length_scale, "sum"
+        )
         if grasp.shape:
             raise GraspModuliError(
                 f"contacts must be one grasp, of shape (m, 3), got a batch of {grasp.shape}"
             )
         _, directions, _, each = grasp.arrays
         points, center, gamma = grasp.given
-        (mu,), sides, _ = grasp.cone
+        (mu,), sides, _, _ = grasp.cone
         self.__dict__.update(
             _batch=grasp,
             contacts=locked(points.copy()),
@@ -168,7 +170,7 @@ class WrenchSpace:
     @cached_property
     def quality(self) -> float:
         """Exact Q_l; see :func:`graspmoduli.quality`."""
-        return self._batch.shaped(_core.quality(self._batch.arrays, self._batch.cone, False))
+        return self._batch.shaped(_core.quality(self._batch.arrays, self._batch.cone))
 
     @cached_property
     def weakest(self) -> Floats:
@@ -179,7 +181,7 @@ class WrenchSpace:
         of their normal forces, and not more along this direction. If Q_l = 0, they cannot resist it
         at all, however hard they press. Shape (6,).
         """
-        _, direction = _core.weakest(self._batch.arrays, self._batch.cone, False)
+        _, direction = _core.weakest(self._batch.arrays, self._batch.cone)
         return locked(-np.array(direction) * self._units)
 
     @cached_property

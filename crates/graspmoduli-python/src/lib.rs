@@ -8,7 +8,7 @@ mod quality;
 mod touch;
 
 use graspmoduli::ascent::{Anywhere, Cells, Region};
-use graspmoduli::contact::FrictionCone;
+use graspmoduli::contact::{FrictionCone, Norm};
 use graspmoduli::distance;
 use graspmoduli::error::Error;
 use graspmoduli::search;
@@ -40,14 +40,15 @@ fn vectors(values: &[f64]) -> &[[f64; 3]] {
 }
 
 /// The friction cones of a call, from a tuple: coefficients, one for all contacts or one each;
-/// edges; torsion.
+/// edges; torsion; whether every finger has a limit of its own.
 #[derive(FromPyObject)]
-pub struct Cone(Vec<f64>, usize, f64);
+pub struct Cone(Vec<f64>, usize, f64, bool);
 
 impl Cone {
     fn build(&self) -> PyResult<FrictionCone> {
         FrictionCone::each(&self.0, self.1)
             .and_then(|cone| cone.soft(self.2))
+            .map(|cone| cone.with_norm(if self.3 { Norm::Each } else { Norm::Sum }))
             .map_err(raise)
     }
 }

@@ -4,7 +4,7 @@ use crate::pool::{detached, interruptible};
 use crate::{Cone, raise, table, vectors};
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
 use graspmoduli::error::Error;
-use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
+use graspmoduli::quality::{Batch, Evaluator, Gradient};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods,
@@ -63,10 +63,6 @@ fn computed<R: Send>(
     })
 }
 
-fn norm(each: bool) -> Norm {
-    if each { Norm::Each } else { Norm::Sum }
-}
-
 /// Is a coordinate 0, or of a size whose powers are numbers? NaN is neither.
 #[inline(always)]
 fn is_usable(x: f64) -> bool {
@@ -105,7 +101,7 @@ pub fn is_clean(
 
 thread_local! {
     /// The evaluator of the last single grasp, for the next one with the same cones.
-    static LAST: RefCell<Option<([f64; 3], Evaluator)>> = const { RefCell::new(None) };
+    static LAST: RefCell<Option<([f64; 3], bool, Evaluator)>> = const { RefCell::new(None) };
 }
 
 /// Q of one grasp, if everything is as the kernel wants it, down to the types; otherwise `None`,
@@ -130,7 +126,7 @@ pub fn quality_of_one(
         let scale = plain(length_scale, 1.0)?;
         let (friction, edges) = (plain(friction, 1.0)?, whole(edges, 8)?);
         let torsion = plain(torsion, 0.0)? / scale;
-        let each = norm.cast::<PyString>().ok()?.to_str().ok()? != "sum";
+        let each = !norm.is_none() && norm.cast::<PyString>().ok()?.to_str().ok()? != "sum";
         let fine = (3..=1 << 12).contains(&edges)
             && (0.0..=1e6).contains(&friction)
             && torsion >= 0.0
@@ -167,17 +163,13 @@ pub fn quality_of_one(
     let run = || -> PyResult<Option<f64>> {
         LAST.with_borrow_mut(|last| {
             let mut evaluator = match last.take() {
-                Some((known, evaluator)) if known == cone => evaluator,
-                _ => Evaluator::new(&Cone(vec![friction], edges as usize, torsion).build()?),
+                Some((known, its, evaluator)) if known == cone && its == each => evaluator,
+                _ => Evaluator::new(&Cone(vec![friction], edges as usize, torsion, each).build()?),
             };
-            let value = if each {
-                evaluator.quality_of_each(&contacts, center.into())
-            } else {
-                evaluator.quality(&contacts, center.into())
-            };
+            let value = evaluator.quality(&contacts, center.into());
             // An error with its sentence is the careful way's, too.
             let known = evaluator.take_unconverged().is_none();
-            *last = Some((cone, evaluator));
+            *last = Some((cone, each, evaluator));
             Ok(known.then_some(value))
         })
     };
@@ -231,19 +223,16 @@ fn whole(value: &Bound<'_, PyAny>, default: usize) -> Option<usize> {
     }
 }
 
-/// Exact Q_l of n grasps, or Q'_l if `each`.
+/// Exact Q_l of n grasps, or Q'_l.
 #[pyfunction]
 pub fn quality<'py>(
     py: Python<'py>,
     grasps: Grasps<'py>,
     cone: Cone,
-    each: bool,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let mut out = vec![0.0; batch.centers.len()];
-    computed(py, batch, |batch| {
-        batch.quality(&cone, norm(each), &mut out)
-    })?;
+    computed(py, batch, |batch| batch.quality(&cone, &mut out))?;
     Ok(PyArray1::from_vec(py, out))
 }
 
@@ -313,16 +302,11 @@ pub fn circular_quality<'py>(
 
 /// Q_l or Q'_l of the first grasp by the expanding polytope, and the normal of the nearest facet.
 #[pyfunction]
-pub fn weakest(
-    py: Python<'_>,
-    grasps: Grasps<'_>,
-    cone: Cone,
-    each: bool,
-) -> PyResult<(f64, [f64; 6])> {
+pub fn weakest(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<(f64, [f64; 6])> {
     let (cone, batch) = (cone.build()?, grasps.batch()?);
     let weakest = py.detach(|| {
         let contacts = contacts(batch.points, batch.normals);
-        Evaluator::new(&cone).weakest(&contacts, batch.centers[0].into(), norm(each))
+        Evaluator::new(&cone).weakest(&contacts, batch.centers[0].into())
     });
     Ok((weakest.quality, weakest.direction))
 }

@@ -14,8 +14,17 @@ pub struct Contact {
     pub normal: DVec3,
 }
 
+/// What a unit of strength of the fingers means (Sec. II of the paper).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Norm {
+    /// The normal forces of all fingers sum to at most 1: Q_l.
+    Sum,
+    /// The normal force of every finger is at most 1: Q'_l.
+    Each,
+}
+
 /// The polygonal friction cones of a grasp's contacts about e₃, and their polar cones: what the
-/// contact frames rotate.
+/// contact frames rotate; and how strong the fingers are, by which their wrenches add up.
 ///
 /// Edge j is f_j = (μ cos φ_j, μ sin φ_j, 1) with φ_j = 2πj/l. The polar cone has the l extreme
 /// rays (cos ψ_j, sin ψ_j, −μ cos(π/l)), ψ_j = 2π(j + ½)/l; ray j is orthogonal to the edges
@@ -25,6 +34,7 @@ pub struct FrictionCone {
     /// One for all contacts, or one for each.
     frictions: Vec<f64>,
     torsion: f64,
+    norm: Norm,
     /// (cos φ_j, sin φ_j).
     pub(crate) edges: Vec<[f64; 2]>,
     /// (cos ψ_j, sin ψ_j).
@@ -60,6 +70,7 @@ impl FrictionCone {
         Ok(Self {
             frictions: frictions.to_vec(),
             torsion: 0.0,
+            norm: Norm::Sum,
             edges: (0..edges).map(|j| at(j as f64)).collect(),
             rays: (0..edges).map(|j| at(j as f64 + 0.5)).collect(),
             inner: math::cos(TAU / (2.0 * edges as f64)),
@@ -74,6 +85,16 @@ impl FrictionCone {
             return Err(Error::Torsion(torsion));
         }
         Ok(Self { torsion, ..self })
+    }
+
+    /// The same cones of fingers with a limit each, or with one for their sum.
+    pub fn with_norm(self, norm: Norm) -> Self {
+        Self { norm, ..self }
+    }
+
+    /// What a unit of strength of the fingers means; [`Norm::Sum`] unless said otherwise.
+    pub fn norm(&self) -> Norm {
+        self.norm
     }
 
     /// Torsional friction coefficient γ, a length; 0 for a hard finger.

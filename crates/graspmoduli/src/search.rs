@@ -5,8 +5,11 @@
 //! of these maxima for a few hundred directions answers "is Q below the best so far?" for most
 //! subsets by the conjunction of a bit mask per contact. The directions are those in which earlier
 //! subsets failed.
+//!
+//! Where every finger has a limit of its own, the hull is the sum of the contacts' hulls, each with
+//! the origin, and h(v) the sum of their maxima where these are positive.
 
-use crate::contact::{Contact, Frame, FrictionCone};
+use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use crate::error::Error;
 use crate::quality::{Evaluator, LARGEST_ERROR, Twist, Weakest};
 use glam::DVec3;
@@ -251,6 +254,7 @@ struct Worker<'a> {
     per_contact: usize,
     /// How far a support value must be below the threshold.
     margin: f64,
+    norm: Norm,
     /// Per direction, the maximum of ⟨v, w⟩ over each contact's wrenches.
     supports: Vec<Vec<f64>>,
     /// Where the next direction goes once the table is full.
@@ -302,7 +306,14 @@ impl<'a> Worker<'a> {
             grasp_frictions: Vec::new(),
             wrenches,
             per_contact: cone.generators(),
-            margin: longest * MARGIN,
+            margin: longest
+                * MARGIN
+                * if own.norm() == Norm::Each {
+                    size as f64
+                } else {
+                    1.0
+                },
+            norm: own.norm(),
             supports: Vec::new(),
             oldest: 0,
             masks: vec![[0; WORDS]; contacts.len()],
@@ -364,8 +375,10 @@ impl<'a> Worker<'a> {
         let mut next = last + 1;
         loop {
             // A new threshold or direction changes the masks: look at them afresh each time.
-            let common = self.common(chosen);
-            next = first_open(&common, &self.masks, next);
+            next = match self.norm {
+                Norm::Sum => first_open(&self.common(chosen), &self.masks, next),
+                Norm::Each => (next..n).find(|&k| self.reaches(chosen, k)).unwrap_or(n),
+            };
             if next == n {
                 break;
             }
@@ -389,7 +402,19 @@ impl<'a> Worker<'a> {
 
     /// Is there no direction in which the grasp is known to stay below the threshold?
     fn may_enter(&self, indices: &[usize]) -> bool {
-        self.common(indices) == [0; WORDS]
+        match self.norm {
+            Norm::Sum => self.common(indices) == [0; WORDS],
+            Norm::Each => self.reaches(&indices[1..], indices[0]),
+        }
+    }
+
+    /// The same for fingers that add up.
+    fn reaches(&self, chosen: &[usize], another: usize) -> bool {
+        let bar = self.threshold - self.margin;
+        self.supports.iter().all(|support| {
+            let sum: f64 = chosen.iter().map(|&k| support[k].max(0.0)).sum();
+            sum + support[another].max(0.0) >= bar
+        })
     }
 
     /// Q of some contacts if it reaches the threshold, else 0; tells the board. Sorts them.
@@ -452,6 +477,9 @@ impl<'a> Worker<'a> {
 
     /// Sets the bits of one direction.
     fn mark(&mut self, slot: usize) {
+        if self.norm == Norm::Each {
+            return;
+        }
         let bar = self.threshold - self.margin;
         let (word, bit) = (slot / 64, slot % 64);
         for (mask, &support) in self.masks.iter_mut().zip(&self.supports[slot]) {

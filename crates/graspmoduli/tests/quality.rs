@@ -1,9 +1,9 @@
 //! Q_l over adversarial and random grasps.
 
 use glam::DVec3;
-use graspmoduli::contact::{Contact, Frame, FrictionCone};
+use graspmoduli::contact::{Contact, Frame, FrictionCone, Norm};
 use graspmoduli::math;
-use graspmoduli::quality::{Batch, Evaluator, Gradient, Norm};
+use graspmoduli::quality::{Batch, Evaluator, Gradient};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -81,6 +81,11 @@ fn cases(cases: u32) -> ProptestConfig {
 }
 
 /// The largest distance between corresponding wrenches.
+/// Evaluates with a limit for every finger.
+fn each_of(cone: &FrictionCone) -> Evaluator {
+    Evaluator::new(&cone.clone().with_norm(Norm::Each))
+}
+
 fn displacement(cone: &FrictionCone, a: &[Contact], b: &[Contact], center: DVec3) -> f64 {
     let mut largest = 0.0_f64;
     for (one, other) in a.iter().zip(b) {
@@ -109,9 +114,9 @@ proptest! {
             prop_assert!(gradient.value.is_finite());
             let vectors = gradient.contacts.iter().chain(&gradient.normals);
             prop_assert!(vectors.chain([&gradient.center_of_mass]).all(|v| v.is_finite()));
-            let each = evaluator.quality_of_each(&contacts, center);
+            let each = each_of(&cone).quality(&contacts, center);
             prop_assert!(each.is_finite() && each >= 0.0, "{each}");
-            let weakest = evaluator.weakest(&contacts, center, Norm::Sum).direction;
+            let weakest = evaluator.weakest(&contacts, center).direction;
             prop_assert!(weakest.iter().all(|x| x.is_finite()), "{weakest:?}");
         }
     }
@@ -122,7 +127,7 @@ proptest! {
     ) {
         let mut evaluator = Evaluator::new(&cone);
         let wanted = evaluator.quality(&contacts, center);
-        let expanded = evaluator.weakest(&contacts, center, Norm::Sum).quality;
+        let expanded = evaluator.weakest(&contacts, center).quality;
         prop_assert!((wanted - expanded).abs() <= 1e-11, "{wanted} {expanded}");
     }
 
@@ -135,7 +140,7 @@ proptest! {
         let quality = evaluator.quality(&contacts, center);
         let length = (linear.length_squared() + angular.length_squared()).sqrt();
         let v = [linear / length, angular / length];
-        let weakest = evaluator.weakest(&contacts, center, Norm::Sum).direction;
+        let weakest = evaluator.weakest(&contacts, center).direction;
         let worst = [0, 3].map(|i| DVec3::new(weakest[i], weakest[i + 1], weakest[i + 2]));
         if quality > 0.0 {
             prop_assert!(support(&cone, &contacts, center, v) >= quality * (1.0 - 1e-9));
@@ -271,7 +276,7 @@ proptest! {
         prop_assert!(quality <= upper + 1e-9, "{quality} {upper}");
         let outside = Evaluator::new(&around).quality(&contacts, center);
         prop_assert!(lower <= outside + 1e-9, "{lower} {outside}");
-        let each = evaluator.quality_of_each(&contacts, center);
+        let each = each_of(&cone).quality(&contacts, center);
         prop_assert!(quality <= each + 1e-9, "{quality} {each}");
         prop_assert!(each <= quality * contacts.len() as f64 + 1e-9, "{quality} {each}");
         let soft = Evaluator::new(&cone.soft(torsion).unwrap()).quality(&contacts, center);
@@ -294,7 +299,7 @@ proptest! {
             let mut evaluator = Evaluator::new(&cone);
             let mut bits = |contacts: &[Contact]| [
                 evaluator.quality(contacts, center),
-                evaluator.quality_of_each(contacts, center),
+                each_of(&cone).quality(contacts, center),
                 evaluator.circular(contacts, center, 0.1).0,
                 evaluator.gradient(contacts, center).value,
             ].map(f64::to_bits);
@@ -394,13 +399,13 @@ fn batches_refuse_parts_that_do_not_fit() {
         frictions: &[],
         stop: None,
     };
-    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 2]).is_err());
+    assert!(batch.quality(&cone, &mut [0.0; 2]).is_err());
     let batch = Batch {
         points: &normals,
         ..batch
     };
-    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 3]).is_err());
-    assert!(batch.quality(&cone, Norm::Sum, &mut [0.0; 2]).is_ok());
+    assert!(batch.quality(&cone, &mut [0.0; 3]).is_err());
+    assert!(batch.quality(&cone, &mut [0.0; 2]).is_ok());
     let batch = Batch {
         frictions: &[1.0; 3],
         ..batch
@@ -424,7 +429,7 @@ fn batches_agree_with_single_grasps() {
         centers: &[[0.0; 3]].repeat(1000),
     };
     let mut out = vec![0.0; 1000];
-    many.quality(&cone, Norm::Sum, &mut out).unwrap();
+    many.quality(&cone, &mut out).unwrap();
     assert!(out.iter().all(|q| (q - 0.544232186874).abs() < 5e-13));
     let width = Gradient::width(3);
     let mut gradients = vec![0.0; 1000 * width];
@@ -501,7 +506,8 @@ fn any_friction_and_many_edges_are_answered() {
                     "{m} {friction} {l} {quality}"
                 );
                 if l < 40 {
-                    evaluator.quality_of_each(&contacts, DVec3::ZERO);
+                    let mut evaluator = each_of(&cone);
+                    evaluator.quality(&contacts, DVec3::ZERO);
                     assert!(evaluator.take_unconverged().is_none(), "{m} {friction} {l}");
                 }
             }

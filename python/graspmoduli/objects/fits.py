@@ -13,7 +13,6 @@ from .._arrays import (
     Floats,
     a_path,
     brief,
-    coefficient,
     count,
     finite,
     floats,
@@ -21,7 +20,7 @@ from .._arrays import (
     number,
     vectors,
 )
-from .._batches import Cone, carried, fingers
+from .._batches import NORMS, Cone, evaluated_with, fingers
 from .._core import GraspModuliError
 from .._files import replacing
 from .._values import Value
@@ -125,6 +124,7 @@ class Fit(Value):
         *,
         contacts: int = 3,
         torsion: float = 0.0,
+        norm: str = "sum",
         top: int = 5,
         friction: ArrayLike = 1.0,
         edges: int = 8,
@@ -155,6 +155,8 @@ class Fit(Value):
             Fingers of a grasp; of a cloud of points three.
         torsion
             Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
+        norm
+            As in :func:`graspmoduli.quality`; of a cloud of points ``"sum"``.
         top
             How many grasps are wanted. Fewer come back if fewer are found, none if the object is
             too thin for these tips or too slippery: on a mesh, qualities below 0.001 do not count.
@@ -173,7 +175,7 @@ class Fit(Value):
         """
         size = count("contacts", contacts, 1, MOST_CONTACTS)
         many = count("top", top, 1, MOST_FOLLOWED)
-        hand = (*fingers(friction, edges, size)[:2], coefficient("torsion", torsion))
+        hand = fingers(friction, edges, size, torsion, norm)
         start = count("seed", seed, 0)
         center = self._center(center_of_mass)
         if self.mesh is None:
@@ -216,11 +218,11 @@ class Fit(Value):
         tip_radius: float | None,
         errors: float | None,
     ) -> list[ObjectGrasp]:
-        mu, edges, torsion = hand
-        if size != 3 or torsion > 0.0:
+        mu, edges, torsion, each = hand
+        if size != 3 or torsion > 0.0 or each:
             raise GraspModuliError(
-                "contacts must be 3 and torsion 0 for a cloud of points, "
-                f"got {size} and {torsion:g}; a mesh takes others"
+                'contacts must be 3, torsion 0 and norm "sum" for a cloud of points, '
+                f'got {size}, {torsion:g} and "{NORMS[each]}"; a mesh takes others'
             )
         for name, value in (("tip_radius", tip_radius), ("errors", errors)):
             if value is not None:
@@ -384,14 +386,9 @@ class Fit(Value):
         **others: Any,
     ) -> ObjectGrasp:
         made = PlacedGrasp(contacts, normals, center)
-        options = {
-            "friction": carried(hand),
-            "edges": hand[1],
-            "length_scale": self.length_scale,
-        }
-        bounds = circular_quality(
-            made, friction=options["friction"], length_scale=options["length_scale"]
-        )
+        options: dict[str, Any] = evaluated_with(hand) | {"length_scale": self.length_scale}
+        rest = {name: value for name, value in options.items() if name != "edges"}
+        bounds = circular_quality(made, **rest)
         if grasp is not None and "coordinates" not in others:
             others["coordinates"] = locked(np.stack([grasp.u, grasp.theta], axis=1))
         return ObjectGrasp(
@@ -400,8 +397,7 @@ class Fit(Value):
             made.center_of_mass,
             grasp=grasp,
             surface=self.surface,
-            quality=quality(made, torsion=hand[2], **options),
-            torsion=hand[2],
+            quality=quality(made, **options),
             round_quality=(bounds.lower, bounds.upper),
             **options,
             **others,

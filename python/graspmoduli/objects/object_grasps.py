@@ -40,6 +40,8 @@ class ObjectGrasp(PlacedGrasp):
     length_scale: float
     #: Torsional friction coefficient, a length.
     torsion: float = 0.0
+    #: What a unit of strength means: ``"sum"`` or ``"each"``, as in :func:`graspmoduli.quality`.
+    norm: str = "sum"
     #: Proven lower and upper bound of the quality with round friction cones, which does not depend
     #: on the axes of the file.
     round_quality: tuple[float, float] | None = None
@@ -57,10 +59,8 @@ class ObjectGrasp(PlacedGrasp):
 
 
 def by_round_cones(grasp: ObjectGrasp) -> float:
-    """What ranks a grasp: what is proven for round cones, or Q_l of soft fingers."""
-    if grasp.torsion > 0.0 or grasp.round_quality is None:
-        return grasp.quality
-    return grasp.round_quality[0]
+    """What ranks a grasp: what is proven for round cones."""
+    return grasp.quality if grasp.round_quality is None else grasp.round_quality[0]
 
 
 def by_errors(grasp: ObjectGrasp) -> float:

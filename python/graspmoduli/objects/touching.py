@@ -308,10 +308,10 @@ def press(
 
 def _request(mesh: TriangleMesh, wanted: Search) -> Any:
     x, y, z = mesh.local(wanted.center_of_mass).tolist()
-    mu, edges, torsion = wanted.hand
+    mu, edges, torsion, each = wanted.hand
     return (
         # Torsion is a length: the kernels divide lengths by the length scale.
-        (mu, edges, torsion / wanted.length_scale),
+        (mu, edges, torsion / wanted.length_scale, each),
         (x, y, z),
         mesh.size / wanted.length_scale,
         wanted.contacts,

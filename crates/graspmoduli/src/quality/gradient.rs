@@ -9,7 +9,7 @@
 use super::r6::{Twist, dot, solve};
 use super::three_contacts::{Active, Vertex};
 use super::wrenches::Wrenches;
-use crate::contact::{Contact, Frame, FrictionCone};
+use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use crate::nnls::nonnegative;
 use glam::DVec3;
 
@@ -111,7 +111,7 @@ pub(super) fn of_vertex(
     if !within {
         let mut all = Wrenches::new();
         let found = nearest && {
-            all.set(contacts, &order, cone, super::Norm::Sum);
+            all.set(contacts, &order, cone);
             foot_point(&all, &direction, value, center, cone, &mut shares)
         };
         // Weights that left the cone are no element of the generalised gradient.
@@ -135,19 +135,15 @@ pub(super) fn foot_point(
 ) -> bool {
     let reference = wrenches.reference;
     let twist = reference.of_twist(*direction, center);
-    let (mut columns, mut active) = (Vec::new(), Vec::new());
-    for (index, wrench) in wrenches.all.iter().enumerate() {
-        if dot(wrench, &twist) >= value * (1.0 - ON_THE_FACET) {
-            columns.push(*wrench);
-            active.push(wrenches.origin(index));
-        }
-    }
     let foot = reference.of_wrench(direction.map(|x| x * value), center);
-    let weights = nonnegative(&columns, foot);
-    let total: f64 = weights.iter().sum();
-    if (total - 1.0).abs() > 1e-6 {
+    let found = match wrenches.norm {
+        Norm::Sum => of_one_hull(wrenches, &twist, value, foot),
+        Norm::Each => of_a_sum_of_hulls(wrenches, &twist, value, foot),
+    };
+    let Some((active, weights)) = found else {
         return false;
-    }
+    };
+    let active: Vec<_> = active.into_iter().map(|k| wrenches.origin(k)).collect();
     shares.fill(Share::default());
     for ((i, k), weight) in active.into_iter().zip(weights) {
         let ([x, y, z], spin) = cone.generator(i, k);
@@ -160,6 +156,73 @@ pub(super) fn foot_point(
         *torque += spin * weight;
     }
     true
+}
+
+/// Wrenches by index, and their weights in a point of a facet.
+type Weighted = (Vec<usize>, Vec<f64>);
+
+/// The foot point as a convex combination of the wrenches on the facet.
+fn of_one_hull(wrenches: &Wrenches, twist: &Twist, value: f64, foot: Twist) -> Option<Weighted> {
+    let all = wrenches.all.iter().enumerate();
+    let (active, columns): (Vec<_>, Vec<_>) = all
+        .filter(|(_, wrench)| dot(wrench, twist) >= value * (1.0 - ON_THE_FACET))
+        .unzip();
+    let weights = nonnegative(&columns, foot);
+    let total: f64 = weights.iter().sum();
+    ((total - 1.0).abs() <= 1e-6).then_some((active, weights))
+}
+
+/// Most contacts with a limit each whose gradient is found.
+const MOST_EACH: usize = 16;
+const ROWS: usize = 6 + MOST_EACH;
+
+/// The foot point as a sum over the contacts: of a convex combination of those wrenches of each
+/// that go farthest along the twist and, where these do not help, of less than that.
+fn of_a_sum_of_hulls(
+    wrenches: &Wrenches,
+    twist: &Twist,
+    value: f64,
+    foot: Twist,
+) -> Option<Weighted> {
+    let (mut active, mut columns) = (Vec::new(), Vec::new());
+    let mut target = [0.0; ROWS];
+    target[..6].copy_from_slice(&foot);
+    let mut index = 0;
+    for (contact, own) in wrenches.by_contact().enumerate() {
+        let row = 6 + contact;
+        *target.get_mut(row)? = 1.0;
+        let farthest = own.iter().map(|w| dot(w, twist)).fold(0.0, f64::max);
+        let near = farthest - value * ON_THE_FACET;
+        let mut offer = |wrench: &Twist, index: usize| {
+            let mut column = [0.0; ROWS];
+            column[..6].copy_from_slice(wrench);
+            column[row] = 1.0;
+            columns.push(column);
+            active.push(index);
+        };
+        for (k, wrench) in own.iter().enumerate() {
+            if dot(wrench, twist) >= near {
+                offer(wrench, index + k);
+            }
+        }
+        if near <= 0.0 {
+            // It may press less.
+            offer(&[0.0; 6], usize::MAX);
+        }
+        index += own.len();
+    }
+    let mut weights = nonnegative(&columns, target);
+    let off = |row: usize| {
+        let sum: f64 = columns.iter().zip(&weights).map(|(c, w)| c[row] * w).sum();
+        (sum - target[row]).abs()
+    };
+    if !(0..ROWS).all(|row| off(row) <= 1e-6) {
+        return None;
+    }
+    let mut keep = active.iter().map(|&k| k != usize::MAX);
+    weights.retain(|_| keep.next() == Some(true));
+    active.retain(|&k| k != usize::MAX);
+    Some((active, weights))
 }
 
 /// dQ = Σ α ⟨v, dw⟩ into `row`, whose layout is that of [`Gradient::width`].

@@ -20,9 +20,8 @@ pub use gradient::Gradient;
 pub use instructions::instructions_name;
 pub(crate) use polytope::LARGEST_ERROR;
 pub use r6::Twist;
-pub use wrenches::Norm;
 
-use crate::contact::{Contact, FrictionCone};
+use crate::contact::{Contact, FrictionCone, Norm};
 use crate::error::Error;
 use glam::DVec3;
 use plane::Three;
@@ -95,7 +94,7 @@ impl Evaluator {
         self.cone.set_frictions(frictions);
     }
 
-    /// Exact Q_l; 0 if the origin is not in the interior of the wrench hull.
+    /// Exact Q_l, or Q'_l of fingers with a limit each; 0 if the origin is not in the interior of the wrench hull.
     #[inline]
     pub fn quality(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
         self.evaluations += 1;
@@ -104,13 +103,7 @@ impl Evaluator {
         {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
-        self.expanded(contacts, center_of_mass, Norm::Sum, never)
-    }
-
-    /// Exact Q'_l: every finger's normal force is at most 1, instead of their sum.
-    pub fn quality_of_each(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> f64 {
-        self.evaluations += 1;
-        self.expanded(contacts, center_of_mass, Norm::Each, never)
+        self.expanded(contacts, center_of_mass, never)
     }
 
     /// Is Q_l ≥ `threshold`? The same as comparing, but ends as soon as it is known.
@@ -139,7 +132,7 @@ impl Evaluator {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
         let below = |_, upper| upper < threshold;
-        self.expanded(contacts, center_of_mass, Norm::Sum, below)
+        self.expanded(contacts, center_of_mass, below)
     }
 
     /// As [`Evaluator::weakest`] if Q_l is at least `threshold`; else some unit direction in which
@@ -161,7 +154,7 @@ impl Evaluator {
             });
         }
         let below = |_, upper| upper < threshold;
-        let distance = self.distance(contacts, center_of_mass, Norm::Sum, below)?;
+        let distance = self.distance(contacts, center_of_mass, below)?;
         let metric = Metric::new(self.wrenches.reference, center_of_mass);
         Some(Weakest {
             quality: self.value(&distance),
@@ -185,7 +178,7 @@ impl Evaluator {
             })
         } else {
             let above = |lower, _| lower >= threshold;
-            self.expanded(contacts, center_of_mass, Norm::Sum, above)
+            self.expanded(contacts, center_of_mass, above)
         };
         quality.min(threshold)
     }
@@ -215,7 +208,7 @@ impl Evaluator {
             }
             return;
         }
-        let weakest = self.weakest(contacts, center, Norm::Sum);
+        let weakest = self.weakest(contacts, center);
         self.foot_point_row(&weakest, contacts, center, row);
     }
 
@@ -240,8 +233,8 @@ impl Evaluator {
 
     /// The quality by the expanding polytope, whatever the number of contacts, with the direction in
     /// which the grasp is weakest.
-    pub fn weakest(&mut self, contacts: &[Contact], center: DVec3, norm: Norm) -> Weakest {
-        self.set_wrenches(contacts, norm);
+    pub fn weakest(&mut self, contacts: &[Contact], center: DVec3) -> Weakest {
+        self.set_wrenches(contacts);
         if self.wrenches.reference.is_point() {
             // All contacts in one place: no force works along a turn about it.
             let v = (self.wrenches.reference.point - center).cross(DVec3::X);
@@ -272,7 +265,7 @@ impl Evaluator {
             return (0.0, 0.0);
         }
         self.sort(contacts);
-        let reference = Reference::new(contacts, &self.order, 0.0);
+        let reference = Reference::new(contacts, &self.order, self.cone.torsion());
         if reference.is_point() {
             return (0.0, 0.0);
         }
@@ -296,7 +289,8 @@ impl Evaluator {
     #[inline]
     fn closed_form<'a>(&mut self, contacts: &'a [Contact]) -> Option<(Three<'a>, [usize; 3])> {
         let three: &[Contact; 3] = contacts.try_into().ok()?;
-        if self.cone.torsion() > 0.0 || self.cone.len() > MOST_EDGES {
+        let hard = self.cone.torsion() == 0.0 && self.cone.norm() == Norm::Sum;
+        if !hard || self.cone.len() > MOST_EDGES {
             return None;
         }
         let [a, b, c] = three;
@@ -335,9 +329,9 @@ impl Evaluator {
         });
     }
 
-    fn set_wrenches(&mut self, contacts: &[Contact], norm: Norm) {
+    fn set_wrenches(&mut self, contacts: &[Contact]) {
         self.sort(contacts);
-        self.wrenches.set(contacts, &self.order, &self.cone, norm);
+        self.wrenches.set(contacts, &self.order, &self.cone);
     }
 
     /// By the expanding polytope; `None` where Q = 0 for want of contacts or of lever arms.
@@ -345,10 +339,9 @@ impl Evaluator {
         &mut self,
         contacts: &[Contact],
         center: DVec3,
-        norm: Norm,
         enough: impl FnMut(f64, f64) -> bool,
     ) -> Option<Distance> {
-        self.set_wrenches(contacts, norm);
+        self.set_wrenches(contacts);
         if self.too_few(contacts) || self.wrenches.reference.is_point() {
             return None;
         }
@@ -361,10 +354,9 @@ impl Evaluator {
         &mut self,
         contacts: &[Contact],
         center: DVec3,
-        norm: Norm,
         enough: impl FnMut(f64, f64) -> bool,
     ) -> f64 {
-        match self.distance(contacts, center, norm, enough) {
+        match self.distance(contacts, center, enough) {
             Some(distance) => self.value(&distance),
             None => 0.0,
         }
@@ -410,7 +402,7 @@ impl Evaluator {
             }
         } else {
             // Of grasps at the limit of what the closed form can tell, the nearest facet only.
-            let weakest = self.weakest(contacts, center_of_mass, Norm::Sum);
+            let weakest = self.weakest(contacts, center_of_mass);
             self.foot_point_row(&weakest, contacts, center_of_mass, &mut row);
             gradients.extend((weakest.quality > 0.0).then(|| Gradient::from_row(&row)));
         }
@@ -473,15 +465,10 @@ const CHUNK: usize = 256;
 
 impl Batch<'_> {
     /// Exact Q_l or Q'_l of every grasp, in parallel on the current rayon pool.
-    pub fn quality(&self, cone: &FrictionCone, norm: Norm, out: &mut [f64]) -> Result<(), Error> {
-        match norm {
-            Norm::Sum => self.each(cone, out, 1, |evaluator, contacts, center, slot| {
-                slot[0] = evaluator.quality(contacts, center);
-            }),
-            Norm::Each => self.each(cone, out, 1, |evaluator, contacts, center, slot| {
-                slot[0] = evaluator.quality_of_each(contacts, center);
-            }),
-        }
+    pub fn quality(&self, cone: &FrictionCone, out: &mut [f64]) -> Result<(), Error> {
+        self.each(cone, out, 1, |evaluator, contacts, center, slot| {
+            slot[0] = evaluator.quality(contacts, center);
+        })
     }
 
     /// Exact Q_l and gradient of every grasp, a row of [`Gradient::width`] each, in parallel.

@@ -2,17 +2,8 @@
 
 use super::polytope::{Levels, Support};
 use super::r6::{Twist, add, dot};
-use crate::contact::{Contact, Frame, FrictionCone};
+use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use glam::DVec3;
-
-/// What a unit of strength of the fingers means (Sec. II of the paper).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Norm {
-    /// The normal forces of all fingers sum to at most 1: Q_l.
-    Sum,
-    /// The normal force of every finger is at most 1: Q'_l.
-    Each,
-}
 
 /// What torques are about and divided by while a hull is expanded: the centroid of the contacts and
 /// their longest distance from it, or the torsional coefficient if that is longer. Whether a grasp
@@ -79,7 +70,7 @@ pub(super) struct Wrenches {
     order: Vec<usize>,
     per_contact: usize,
     pub reference: Reference,
-    norm: Norm,
+    pub norm: Norm,
 }
 
 impl Wrenches {
@@ -97,10 +88,10 @@ impl Wrenches {
     }
 
     /// `order` is the order in which the contacts' wrenches are looked at.
-    pub fn set(&mut self, contacts: &[Contact], order: &[usize], cone: &FrictionCone, norm: Norm) {
+    pub fn set(&mut self, contacts: &[Contact], order: &[usize], cone: &FrictionCone) {
         self.reference = Reference::new(contacts, order, cone.torsion());
         self.per_contact = cone.generators();
-        self.norm = norm;
+        self.norm = cone.norm();
         self.order.clear();
         self.order.extend_from_slice(order);
         self.all.clear();
@@ -112,6 +103,11 @@ impl Wrenches {
                 self.reference.wrench(contact, frame.turn(local), spin)
             }));
         }
+    }
+
+    /// The wrenches of each contact, in their order.
+    pub fn by_contact(&self) -> impl Iterator<Item = &[Twist]> {
+        self.all.chunks_exact(self.per_contact)
     }
 
     /// The contact of a wrench, and which of its generators it comes from.
@@ -143,7 +139,7 @@ impl Support for Wrenches {
         }
         // A finger that cannot help does not press.
         let (mut sum, mut key) = ([0.0; 6], 0u64);
-        for own in self.all.chunks_exact(self.per_contact) {
+        for own in self.by_contact() {
             let (index, height) = farthest_of(own, x);
             key = key.wrapping_mul(self.per_contact as u64 + 1);
             if height > 0.0 {
@@ -158,7 +154,7 @@ impl Support for Wrenches {
         let longest = |own: &[Twist]| own.iter().map(|w| dot(w, w)).fold(0.0, f64::max).sqrt();
         match self.norm {
             Norm::Sum => longest(&self.all),
-            Norm::Each => self.all.chunks_exact(self.per_contact).map(longest).sum(),
+            Norm::Each => self.by_contact().map(longest).sum(),
         }
     }
 
@@ -195,7 +191,7 @@ pub(super) struct Circular<'a> {
 
 impl Support for Circular<'_> {
     fn farthest(&self, x: &Twist) -> (Twist, u64) {
-        let mut best = ([0.0; 6], f64::NEG_INFINITY);
+        let (mut best, mut sum) = (([0.0; 6], f64::NEG_INFINITY), [0.0; 6]);
         let linear = DVec3::new(x[0], x[1], x[2]);
         let angular = DVec3::new(x[3], x[4], x[5]) / self.reference.scale;
         for &i in self.order {
@@ -203,36 +199,59 @@ impl Support for Circular<'_> {
             let velocity = linear + angular.cross(contact.point - self.reference.point);
             let friction = self.cone.friction(i);
             let force = contact.normal + sideways(velocity, contact.normal) * friction;
-            let wrench = self.reference.wrench(contact, force, 0.0);
-            let height = dot(x, &wrench);
+            let mut wrench = self.reference.wrench(contact, force, 0.0);
+            let mut height = dot(x, &wrench);
+            if self.cone.torsion() > 0.0 {
+                let spin = self.cone.torsion().copysign(angular.dot(contact.normal));
+                let twisted = self.reference.wrench(contact, contact.normal, spin);
+                if dot(x, &twisted) > height {
+                    (wrench, height) = (twisted, dot(x, &twisted));
+                }
+            }
             if height > best.1 {
                 best = (wrench, height);
             }
+            if height > 0.0 {
+                sum = add(&sum, 1.0, &wrench);
+            }
         }
+        let found = match self.cone.norm() {
+            Norm::Sum => best.0,
+            Norm::Each => sum,
+        };
         // Every point of a circle is another: its bits tell them apart.
-        let key = best
-            .0
+        let key = found
             .iter()
             .fold(0u64, |key, c| key.rotate_left(9) ^ c.to_bits());
-        (best.0, key)
+        (found, key)
     }
 
     fn size(&self) -> f64 {
-        // Lever arms are at most 1 here.
+        // Lever arms and the torsional coefficient are at most 1 here.
         let frictions = self.order.iter().map(|&i| self.cone.friction(i));
         let steepest = frictions.fold(0.0, f64::max);
-        (2.0 * (1.0 + steepest * steepest)).sqrt()
+        let longest = (3.0 + 2.0 * steepest * steepest).sqrt();
+        match self.cone.norm() {
+            Norm::Sum => longest,
+            Norm::Each => longest * self.order.len() as f64,
+        }
     }
 
     fn inside(&self, levels: Levels) -> Twist {
-        // A triangle of edges within each cone, more of one than of the next.
+        // A triangle of edges within each cone and what spins, more of one than of the next.
+        let per_contact = if self.cone.torsion() > 0.0 { 5 } else { 3 };
         mean((0..).zip(self.order).flat_map(|(number, &i)| {
             let contact = &self.contacts[i];
             let frame = Frame::new(contact.normal);
-            (0..3).map(move |k| {
-                let force = self.cone.edge(i, &frame, k * self.cone.len() / 3);
-                let weight = levels.spread(3 * number + k as u64);
-                (weight, self.reference.wrench(contact, force, 0.0))
+            let spin = self.cone.torsion();
+            (0..per_contact).map(move |k| {
+                let (force, spin) = match k {
+                    0..3 => (self.cone.edge(i, &frame, k * self.cone.len() / 3), 0.0),
+                    3 => (contact.normal, spin),
+                    _ => (contact.normal, -spin),
+                };
+                let weight = levels.spread(per_contact as u64 * number + k as u64);
+                (weight, self.reference.wrench(contact, force, spin))
             })
         }))
     }
