@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 SOURCES := $(shell find crates python -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long portable test-extras test-browser lint format reproduce docs bench clean prerequisites
+.PHONY: help demo test test-long portable test-extras test-browser lint format reproduce docs wheel bench clean prerequisites
 
 help: ## This list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -39,6 +39,12 @@ test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwrig
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
 	    --editable '.[view]' 'playwright>=1.50'
 	$(BIN)/pytest tests/browser
+
+wheel: $(READY) ## A wheel for this platform in out/wheels/, tried in an empty environment
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 'maturin>=1.16,<2'
+	rm -rf out/wheels
+	$(BIN)/maturin build --release --quiet --out out/wheels
+	$(BIN)/python tests/wheel.py out/wheels
 
 portable: $(READY) ## The same answers under every instruction set of this machine
 	$(BIN)/python tests/portable/check.py
