@@ -1,9 +1,9 @@
 //! Vertices of P with one velocity at the apex of its cone, one on a ray and one on a face.
 
-use super::lanes::{Lane, Number, dot, load, splat_each, store};
-use super::plane::{LANES, Lanes, Plane, at};
+use super::lanes::{LANES, Lane, Lanes, Number, at, dot, load, splat_each, store};
+use super::plane::Plane;
 use super::r6::Twist;
-use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, ray};
+use super::vertex::{Active, Found, LEVEL, Question, SLACK, TIE, ray};
 use glam::DVec2;
 use pulp::Simd;
 use std::ops::ControlFlow;
@@ -17,19 +17,16 @@ const ROLES: [[usize; 3]; 6] = [
     [1, 2, 0],
     [2, 1, 0],
 ];
-/// Edges this parallel to the plane (as a share of their length) bound no height.
-pub(super) const LEVEL: f64 = 1e-12;
-
 /// Edges of one contact as bounds on the height h of y − n over its planar part w: from above or
 /// below, h = ⟨slope, w⟩.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Bounds {
+struct Bounds {
     above: Vec<(DVec2, usize)>,
     below: Vec<(DVec2, usize)>,
 }
 
 impl Bounds {
-    pub fn new(edges: usize) -> Self {
+    fn new(edges: usize) -> Self {
         Self {
             above: Vec::with_capacity(edges),
             below: Vec::with_capacity(edges),
@@ -63,30 +60,47 @@ struct Held {
     base: Twist,
 }
 
-impl Kernel {
+/// Working memory for candidates with an apex.
+#[derive(Debug, Clone)]
+pub(super) struct Apexes {
+    bounds: [Bounds; 3],
+    /// ‖x‖² of candidates; see [`Apexes::look`].
+    squares: Vec<Lanes>,
+}
+
+impl Apexes {
+    pub fn new(edges: usize) -> Self {
+        Self {
+            bounds: std::array::from_fn(|_| Bounds::new(edges)),
+            squares: vec![Lanes::default(); 12 * edges.div_ceil(LANES)],
+        }
+    }
+
     /// apex–ray–face: y_i = n_i, y_k = n_k + ρ ray_kj with ρ from the rigidity of the pair; these
     /// two fix the planar velocity w of contact m. Over w the polar cone of m is an interval of
     /// heights, and its ends are the vertices. A lane per ray of contact k.
     #[inline(always)]
-    pub(super) fn apexes<S: Simd>(
+    pub fn look<S: Simd>(
         &mut self,
         simd: S,
+        plane: &Plane,
         question: Question,
         limit: &mut f64,
+        found: &mut Found,
     ) -> ControlFlow<()> {
-        set_bounds(&self.plane, &mut self.bounds);
-        let blocks = self.plane.edges.div_ceil(LANES);
+        set_bounds(plane, &mut self.bounds);
+        let blocks = plane.edges.div_ceil(LANES);
         for (roles, index) in ROLES.into_iter().zip(0..) {
             for block in 0..blocks {
                 let row = 2 * (index * blocks + block);
-                self.heights(simd, roles, block, row);
+                self.heights(simd, plane, roles, block, row);
             }
         }
         if let Question::All(..) = question {
             for row in 0..self.squares.len() {
                 for lane in 0..LANES {
                     if self.squares[row][lane] > *limit * (1.0 - TIE) {
-                        self.offer_end(row, lane, question, limit)?;
+                        self.offer_end(plane, row, lane, question, limit, found)?;
                     }
                 }
             }
@@ -98,15 +112,15 @@ impl Kernel {
             if longest <= *limit * (1.0 - TIE) {
                 return ControlFlow::Continue(());
             }
-            let found = self.squares.iter().enumerate().find_map(|(row, squares)| {
+            let place = self.squares.iter().enumerate().find_map(|(row, squares)| {
                 let lane = squares.iter().position(|&square| square == longest)?;
                 Some((row, lane))
             });
-            let Some((row, lane)) = found else {
+            let Some((row, lane)) = place else {
                 return ControlFlow::Continue(());
             };
             self.squares[row][lane] = 0.0;
-            self.offer_end(row, lane, question, limit)?;
+            self.offer_end(plane, row, lane, question, limit, found)?;
         }
     }
 
@@ -132,12 +146,13 @@ impl Kernel {
     fn heights<S: Simd>(
         &mut self,
         simd: S,
+        plane: &Plane,
         [apex, other, face]: [usize; 3],
         block: usize,
         row: usize,
     ) {
-        let sides = &self.plane.sides;
-        let (along, distance) = self.plane.way(apex, other);
+        let sides = &plane.sides;
+        let (along, distance) = plane.way(apex, other);
         let fixed = sides[apex].normal.truncate();
         let gap = Lane::splat(simd, along.dot(fixed - sides[other].normal.truncate()));
         let lever = sides[face].point - sides[apex].point;
@@ -149,7 +164,7 @@ impl Kernel {
         let [lx, ly] = splat_each(simd, lever.to_array());
         let [rest_x, rest_y] = splat_each(simd, rest.to_array());
         let normal = splat_each(simd, sides[other].normal.to_array());
-        let velocity = self.plane.velocity;
+        let velocity = plane.velocity;
         let lift = velocity.lift(face);
         let lift_squared = Lane::splat(simd, dot(&lift, &lift));
         let lift = splat_each(simd, lift);
@@ -203,12 +218,12 @@ impl Kernel {
 
     /// The motions left when y of contact `apex` is at the apex and that of another on a ray.
     #[inline(always)]
-    fn hold(&self, [apex, other, face]: [usize; 3], j: usize) -> Held {
-        let sides = &self.plane.sides;
-        let (along, distance) = self.plane.way(apex, other);
+    fn hold(plane: &Plane, [apex, other, face]: [usize; 3], j: usize) -> Held {
+        let sides = &plane.sides;
+        let (along, distance) = plane.way(apex, other);
         let fixed = sides[apex].normal.truncate();
         let gap = along.dot(fixed - sides[other].normal.truncate());
-        let direction = ray(&self.plane, other, j);
+        let direction = ray(plane, other, j);
         let slope = along.dot(direction.truncate());
         let moved = sides[other].normal + direction * (gap / slope);
         let spin = along.perp_dot(moved.truncate() - fixed) / distance;
@@ -216,28 +231,30 @@ impl Kernel {
         let mut heights = sides.each_ref().map(|side| side.normal.z);
         heights[other] = moved.z;
         let origin = fixed - sides[apex].point.perp() * spin;
-        let velocity = self.plane.velocity;
+        let velocity = plane.velocity;
         Held {
             offset: fixed + lever.perp() * spin - sides[face].normal.truncate(),
             base: velocity.rigid(origin.to_array(), spin, heights),
         }
     }
 
-    /// The candidate of one of `squares`, computed as in [`Kernel::heights`].
+    /// The candidate of one of `squares`, computed as in [`Apexes::heights`].
     #[inline(always)]
     fn offer_end(
-        &mut self,
+        &self,
+        plane: &Plane,
         row: usize,
         lane: usize,
         question: Question,
         limit: &mut f64,
+        found: &mut Found,
     ) -> ControlFlow<()> {
-        let blocks = self.plane.edges.div_ceil(LANES);
+        let blocks = plane.edges.div_ceil(LANES);
         let roles = ROLES[row / (2 * blocks)];
         let j = row / 2 % blocks * LANES + lane;
         let top = row.is_multiple_of(2);
         let [apex, other, face] = roles;
-        let held = self.hold(roles, j);
+        let held = Self::hold(plane, roles, j);
         let bounds = &self.bounds[face];
         let (edges, sign) = if top {
             (&bounds.above, 1.0)
@@ -251,13 +268,13 @@ impl Kernel {
                 (rise, edge) = (height, *j);
             }
         }
-        let lift = self.plane.velocity.lift(face);
+        let lift = plane.velocity.lift(face);
         let twist = std::array::from_fn(|i| held.base[i] + lift[i] * (sign * rise));
         let active = Active::Apex {
             apex,
             ray: (other, j),
             edge: (face, edge),
         };
-        self.offer(twist, active, question, limit)
+        found.offer(plane, twist, active, question, limit)
     }
 }

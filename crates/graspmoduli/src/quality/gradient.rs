@@ -7,7 +7,7 @@
 //! ∂Q/∂n_i is the gradient of ⟨V_i, R(n_i) g_i⟩ + s_i ⟨v_ω, n_i⟩ with g_i = R(n_i)ᵀ F_i held fixed.
 
 use super::r6::{Twist, dot, solve};
-use super::three_contacts::{Active, Vertex};
+use super::vertex::{Active, Vertex};
 use super::wrenches::Wrenches;
 use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use crate::nnls::nonnegative;

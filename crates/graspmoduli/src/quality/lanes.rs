@@ -1,8 +1,60 @@
-//! Formulas written once for one number and for a vector register of them.
+//! Formulas written once for one number and for a vector register of them, and rows of numbers as
+//! registers take them.
 
-use super::plane::Lanes;
 use pulp::Simd;
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Deref, DerefMut, Div, Mul, Sub};
+
+/// Numbers in a row.
+pub(super) const LANES: usize = 8;
+/// A row of numbers, one per ray or edge of a cone: a cache line, and the widest register.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub(super) struct Lanes(pub [f64; LANES]);
+
+impl Deref for Lanes {
+    type Target = [f64; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64; LANES] {
+        &self.0
+    }
+}
+
+impl DerefMut for Lanes {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64; LANES] {
+        &mut self.0
+    }
+}
+
+/// Vectors by their components, a lane each; block after block.
+pub(super) type Table<const N: usize> = Vec<[Lanes; N]>;
+
+pub(super) fn zeros<const N: usize>(edges: usize) -> Table<N> {
+    vec![[Lanes::default(); N]; edges.div_ceil(LANES)]
+}
+
+/// One vector of a table.
+#[inline(always)]
+pub(super) fn at<const N: usize>(table: &Table<N>, index: usize) -> [f64; N] {
+    let block = &table[index / LANES];
+    std::array::from_fn(|axis| block[axis][index % LANES])
+}
+
+/// Vectors (x, y, height) about e₃, padded with zeros to whole lanes.
+pub(super) fn padded(
+    vectors: impl Iterator<Item = [f64; 2]>,
+    count: usize,
+    height: f64,
+) -> Table<3> {
+    let mut table = zeros(count);
+    for (index, [x, y]) in vectors.enumerate() {
+        for (row, value) in table[index / LANES].iter_mut().zip([x, y, height]) {
+            row[index % LANES] = value;
+        }
+    }
+    table
+}
 
 /// What the kernel's formulas need of a number.
 ///

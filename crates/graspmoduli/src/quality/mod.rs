@@ -4,16 +4,20 @@
 //! by an expanding polytope ([`polytope`]) that needs no more than the hull's farthest points.
 
 mod apex_ray_face;
+mod force_closure;
 mod gradient;
 mod instructions;
 mod lanes;
+mod metric;
 mod plane;
 mod polytope;
 mod r6;
 mod ray_ray_ray;
+mod support;
 mod surround;
 mod three_contacts;
 mod velocity;
+mod vertex;
 mod wrenches;
 
 pub use gradient::Gradient;
@@ -24,8 +28,9 @@ pub use r6::Twist;
 use crate::contact::{Contact, FrictionCone, Norm};
 use crate::error::Error;
 use glam::DVec3;
+use metric::Metric;
 use plane::Three;
-use polytope::{Distance, Metric, Polytope};
+use polytope::{Distance, Polytope};
 use rayon::prelude::*;
 use std::cmp::Ordering as CompareOrdering;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -15,45 +15,12 @@
 //! be told from rounding all the same, the expansion begins anew in coordinates in which the hull
 //! is not flat, and then with other, larger ε_p.
 
-use super::r6::{Twist, dot, solve, unit};
+use super::metric::Metric;
+use super::r6::{Twist, dot, solve};
+use super::support::{Levels, Support, mix};
 use super::surround::{BOUNDARY, Coordinates, Own, Position, Simplex, UNCLEAR_BOUNDARY, surround};
-use super::wrenches::Reference;
-use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
-
-/// A convex hull by its farthest points.
-pub(super) trait Support {
-    /// A point of the hull with the greatest ⟨x, p⟩, and a number that identifies it.
-    fn farthest(&self, x: &Twist) -> (Twist, u64);
-    /// A point in the interior of the hull, relative to its dimension, in general position; other
-    /// levels give another.
-    fn inside(&self, levels: Levels) -> Twist;
-    /// About how far the hull reaches from the origin; not less.
-    fn size(&self) -> f64;
-}
-
-/// The levels 1 + ε_p at which points count.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Levels {
-    epsilon: f64,
-    /// Tells one attempt's levels from another's.
-    salt: u64,
-}
-
-impl Levels {
-    /// The level of the point with this key.
-    #[inline]
-    pub fn of(self, key: u64) -> f64 {
-        1.0 + self.epsilon * self.spread(key)
-    }
-
-    /// Numbers in [0.5, 1] that no relation among the points knows of.
-    #[inline]
-    pub fn spread(self, key: u64) -> f64 {
-        0.5 + 0.5 * (mix(key ^ self.salt) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 /// The perturbations ε that are tried, one after the other.
 const EPSILONS: [f64; 6] = [1e-9, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
@@ -107,60 +74,6 @@ impl Distance {
             self.upper = height / length;
             self.direction = x.map(|c| c / length);
         }
-    }
-}
-
-/// Lengths of twists about the centre of mass, of which the hull's coordinates are about another
-/// point and in another unit of length.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Metric {
-    /// From the centre of mass to the point that torques of the hull are about, and what they
-    /// were divided by: ‖x‖² = ‖v − ω/scale × shift‖² + ‖ω/scale‖².
-    shift: DVec3,
-    scale: f64,
-    /// Both terms are multiplied by this, so that neither overflows.
-    unit: f64,
-}
-
-impl Metric {
-    pub fn new(reference: Reference, center_of_mass: DVec3) -> Self {
-        Self {
-            shift: reference.point - center_of_mass,
-            scale: reference.scale,
-            unit: reference.scale.min(1.0),
-        }
-    }
-
-    /// Can lengths be computed without overflow?
-    fn is_tame(&self) -> bool {
-        let reach = self.shift.abs().max_element();
-        let tame = |length: f64| (1e-140..1e140).contains(&length);
-        tame(self.scale) && reach < 1e140 && reach / self.scale < 1e140 && self.shift.is_finite()
-    }
-
-    /// v and ω about the centre of mass, times the unit.
-    #[inline(always)]
-    fn about_center(self, [a, b, c, d, e, f]: &Twist) -> [DVec3; 2] {
-        let angular = DVec3::new(*d, *e, *f) * (self.unit / self.scale);
-        let linear = DVec3::new(*a, *b, *c) * self.unit - angular.cross(self.shift);
-        [linear, angular]
-    }
-
-    #[inline(always)]
-    fn square(self, x: &Twist) -> f64 {
-        let [linear, angular] = self.about_center(x);
-        linear.length_squared() + angular.length_squared()
-    }
-
-    #[inline(always)]
-    fn length(self, x: &Twist) -> f64 {
-        self.square(x).sqrt() / self.unit
-    }
-
-    /// The unit twist about the centre of mass.
-    pub fn direction(self, x: &Twist) -> Twist {
-        let [v, w] = self.about_center(x);
-        unit(&[v.x, v.y, v.z, w.x, w.y, w.z]).0
     }
 }
 
@@ -500,12 +413,4 @@ impl Polytope {
         }
         best.lower = best.lower.min(best.upper);
     }
-}
-
-/// The finaliser of SplitMix64.
-fn mix(key: u64) -> u64 {
-    let mut z = key.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

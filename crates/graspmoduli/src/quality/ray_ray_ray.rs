@@ -1,17 +1,18 @@
 //! Vertices of P with all three velocities on rays of their cones.
 
-use super::apex_ray_face::LEVEL;
-use super::lanes::{Lane, Number, dot, load, splat_all, splat_each, store};
-use super::plane::{LANES, Lanes, at};
-use super::three_contacts::{Active, Kernel, Question, SLACK, TIE, TINY, ray};
+use super::lanes::{
+    LANES, Lane, Lanes, Number, Table, at, dot, load, splat_all, splat_each, store, zeros,
+};
+use super::plane::Plane;
+use super::vertex::{Active, Found, LEVEL, Question, SLACK, TIE, TINY, ray};
 use glam::DVec2;
 use pulp::Simd;
 use std::ops::{ControlFlow, Range};
 
 /// What the kernel's rows need, for a block of rays of contact 1 and one of contact 2; see
-/// [`Kernel::rays`] and [`Kernel::forms`]. A lane per ray.
+/// [`Triples::look`] and [`Triples::forms`]. A lane per ray.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Forms {
+struct Forms {
     first: First,
     second: Second,
     /// Per ray of contact 1; lanes over rays of contact 2.
@@ -44,7 +45,27 @@ struct Form {
     open: u32,
 }
 
-impl Kernel {
+/// Working memory for candidates on three rays.
+#[derive(Debug, Clone)]
+pub(super) struct Triples {
+    /// Per ray of contacts 1 and 2: components along two sides of the triangle; see
+    /// [`Triples::look`].
+    pairs: [Table<2>; 2],
+    /// Per ray of contact 3: components b, c along two sides and z out of the plane as b, c, b²,
+    /// bc, c², bz, cz, z².
+    third: Table<8>,
+    forms: Forms,
+}
+
+impl Triples {
+    pub fn new(edges: usize) -> Self {
+        Self {
+            pairs: [zeros(edges), zeros(edges)],
+            third: zeros(edges),
+            forms: Forms::default(),
+        }
+    }
+
     /// ray–ray–ray: with unit vectors e_ik along the sides, rigidity is
     ///   a₁ρ₁ − a₂ρ₂ = k₁₂,  b₁ρ₁ − b₃ρ₃ = k₁₃,  c₂ρ₂ − c₃ρ₃ = k₂₃,
     /// a_i = e₁₂·ray_i, b_i = e₁₃·ray_i, c_i = e₂₃·ray_i, k_ij = e_ij·(n_j − n_i).
@@ -54,27 +75,30 @@ impl Kernel {
     /// are computed for all rays of contact 2 at once, and so are its values and the signs of ρ with
     /// one ray of contact 3 after the other.
     #[inline(always)]
-    pub(super) fn rays<S: Simd>(
+    pub fn look<S: Simd>(
         &mut self,
         simd: S,
+        plane: &Plane,
         question: Question,
         limit: &mut f64,
+        found: &mut Found,
     ) -> ControlFlow<()> {
-        self.project_rays();
-        let blocks = self.plane.edges.div_ceil(LANES);
-        let tie = self.tie();
+        self.project_rays(plane);
+        let blocks = plane.edges.div_ceil(LANES);
+        let tie = Self::tie(plane);
         for block1 in 0..blocks {
             for block2 in 0..blocks {
                 let mut bar = *limit * (1.0 - tie);
-                self.forms(simd, block1, block2, bar);
+                self.forms(simd, plane, block1, block2, bar);
                 let mut row = 0;
-                while row < LANES.min(self.plane.edges - block1 * LANES) {
-                    self.row(simd, [block1, row, block2], tie, bar, question, limit)?;
+                while row < LANES.min(plane.edges - block1 * LANES) {
+                    let at = [block1, row, block2];
+                    self.row(simd, plane, at, tie, bar, question, limit, found)?;
                     row += 1;
                     // A longer twist found: the rows after this one can refuse more.
                     if *limit * (1.0 - tie) > 2.0 * bar {
                         bar = *limit * (1.0 - tie);
-                        self.forms(simd, block1, block2, bar);
+                        self.forms(simd, plane, block1, block2, bar);
                     }
                 }
             }
@@ -84,14 +108,17 @@ impl Kernel {
 
     /// The rays of contacts 2 and 3 that go with one ray of contact 1; a lane per ray of contact 2.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "inlined: the state of the loop")]
     fn row<S: Simd>(
-        &mut self,
+        &self,
         simd: S,
+        plane: &Plane,
         [block1, lane1, block2]: [usize; 3],
         tie: f64,
         bar: f64,
         question: Question,
         limit: &mut f64,
+        found: &mut Found,
     ) -> ControlFlow<()> {
         let slack = Lane::splat(simd, -SLACK);
         let minus_tiny = Lane::splat(simd, -TINY * bar);
@@ -106,7 +133,7 @@ impl Kernel {
             let n1 = load(simd, &self.forms.second.n1, v);
             let [n3] = load(simd, std::array::from_ref(&form.n3), v);
             let q = load(simd, &form.squares, v);
-            for j3 in 0..self.plane.edges {
+            for j3 in 0..plane.edges {
                 let third = &self.third[j3 / LANES];
                 let [b, c, bb, bc, cc, bz, cz, zz] = splat_all(simd, third, j3 % LANES);
                 let det = d[0].mul_add(b, d[1] * c);
@@ -117,7 +144,7 @@ impl Kernel {
                     + q[3].mul_add(bz, q[4].mul_add(cz, q[5].mul_add(zz, minus_tiny)));
                 if worst.any_at_least(slack, excess) {
                     let at = [block1 * LANES + lane1, block2, j3];
-                    self.offer_rays(at, lanes.clone(), tie, question, limit)?;
+                    self.offer_rays(plane, at, lanes.clone(), tie, question, limit, found)?;
                 }
             }
         }
@@ -127,32 +154,32 @@ impl Kernel {
     /// Relative rounding error to allow for in the quadratic forms: they cancel where the
     /// triangle of contacts is low or the centre of mass far.
     #[inline(always)]
-    fn tie(&self) -> f64 {
-        let [first, second, third] = self.plane.length();
+    fn tie(plane: &Plane) -> f64 {
+        let [first, second, third] = plane.length();
         let longest = first.max(second).max(third);
-        let reach = self.plane.center.length();
-        let shape = longest * longest / (first * self.plane.sides[2].point.y)
+        let reach = plane.center.length();
+        let shape = longest * longest / (first * plane.sides[2].point.y)
             * (1.0 + reach.min(reach / longest));
         (1e-14 * shape * shape).clamp(TIE, 1.0)
     }
 
     /// k₁₂, k₁₃, k₂₃.
     #[inline(always)]
-    fn gaps(&self) -> [f64; 3] {
-        let [e12, e13, e23] = self.plane.along();
-        let normals = self.plane.sides.each_ref().map(|side| side.normal);
+    fn gaps(plane: &Plane) -> [f64; 3] {
+        let [e12, e13, e23] = plane.along();
+        let normals = plane.sides.each_ref().map(|side| side.normal);
         let k = |e: DVec2, from: usize, to: usize| e.dot((normals[to] - normals[from]).truncate());
         [k(e12, 0, 1), k(e13, 0, 2), k(e23, 1, 2)]
     }
 
     /// Fills `pairs` and `third`.
     #[inline(always)]
-    fn project_rays(&mut self) {
-        let [e12, e13, e23] = self.plane.along();
+    fn project_rays(&mut self, plane: &Plane) {
+        let [e12, e13, e23] = plane.along();
         for (contact, directions) in [[e12, e13], [e12, e23]].into_iter().enumerate() {
             for (pair, [x, y, _]) in self.pairs[contact]
                 .iter_mut()
-                .zip(&self.plane.sides[contact].ray)
+                .zip(&plane.sides[contact].ray)
             {
                 for (out, e) in pair.iter_mut().zip(directions) {
                     for lane in 0..LANES {
@@ -161,7 +188,7 @@ impl Kernel {
                 }
             }
         }
-        for (out, [x, y, z]) in self.third.iter_mut().zip(&self.plane.sides[2].ray) {
+        for (out, [x, y, z]) in self.third.iter_mut().zip(&plane.sides[2].ray) {
             for lane in 0..LANES {
                 let b = e13.x * x[lane] + e13.y * y[lane];
                 let c = e23.x * x[lane] + e23.y * y[lane];
@@ -184,10 +211,9 @@ impl Kernel {
     ///   R = a₂ G' + u B,  G' = −b₁X − k₁₃A,  u = k₁₂b₁ − a₁k₁₃.
     /// D is b₃c₂a₁ − c₃a₂b₁, so −bar·D² only changes ⟨G, G⟩, ⟨G, G'⟩ and ⟨G', G'⟩.
     #[inline(always)]
-    fn forms<S: Simd>(&mut self, simd: S, block1: usize, block2: usize, bar: f64) {
-        let gaps = self.gaps();
+    fn forms<S: Simd>(&mut self, simd: S, plane: &Plane, block1: usize, block2: usize, bar: f64) {
+        let gaps = Self::gaps(plane);
         let Self {
-            plane,
             pairs,
             forms:
                 Forms {
@@ -316,20 +342,23 @@ impl Kernel {
         }
     }
 
-    /// The same tests as in [`Kernel::row`], one ray of contact 2 after the other.
+    /// The same tests as in [`Triples::row`], one ray of contact 2 after the other.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "inlined: the state of the loop")]
     fn offer_rays(
-        &mut self,
+        &self,
+        plane: &Plane,
         [j1, block2, j3]: [usize; 3],
         lanes: Range<usize>,
         tie: f64,
         question: Question,
         limit: &mut f64,
+        found: &mut Found,
     ) -> ControlFlow<()> {
         let lane1 = j1 % LANES;
-        let velocity = self.plane.velocity;
-        let normals = self.plane.sides.each_ref().map(|side| side.normal);
-        let (ray1, ray3) = (ray(&self.plane, 0, j1), ray(&self.plane, 2, j3));
+        let velocity = plane.velocity;
+        let normals = plane.sides.each_ref().map(|side| side.normal);
+        let (ray1, ray3) = (ray(plane, 0, j1), ray(plane, 2, j3));
         let [b, c, ..] = at(&self.third, j3);
         let along = |row: [f64; 2]| row[0].mul_add(b, row[1] * c);
         let n2 = along(self.forms.first.n2.map(|row| row[lane1]));
@@ -346,7 +375,7 @@ impl Kernel {
                 continue;
             }
             let j2 = block2 * LANES + lane2;
-            let ray2 = ray(&self.plane, 1, j2);
+            let ray2 = ray(plane, 1, j2);
             let first = normals[0] + ray1 * (n1 / det);
             let twist = velocity.twist(
                 first.to_array(),
@@ -356,7 +385,7 @@ impl Kernel {
             );
             // As in the quadratic form, a vanishing determinant counts as 1e-14.
             if dot(&twist, &twist) * det * det > *limit * (1.0 - tie) * (det * det + TINY) {
-                self.offer(twist, Active::Rays([j1, j2, j3]), question, limit)?;
+                found.offer(plane, twist, Active::Rays([j1, j2, j3]), question, limit)?;
             }
         }
         ControlFlow::Continue(())

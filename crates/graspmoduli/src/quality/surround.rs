@@ -11,8 +11,8 @@
 //! than any real one, so that x has two parts: that of the artificial costs counts first, and
 //! when no point of the hull lies beyond it, it is the normal of the separating plane.
 
-use super::polytope::{Levels, Support};
 use super::r6::{Twist, add, dot, unit};
+use super::support::{Levels, Support};
 
 /// A hull that reaches no farther than this beyond a plane through the origin, in units of forces
 /// and of torques about the contacts' centroid over the longest distance from it, does not contain

@@ -8,86 +8,29 @@
 //! 1 for a face; generically that is ray–ray–ray or apex–ray–face. Every candidate of either kind
 //! is a 3×3 system, and a vertex exactly when its three multipliers are not negative.
 //!
-//! The loops below only propose twists; [`Kernel::offer`] divides each by its support h(x) = max
+//! The loops below only propose twists; [`Found::offer`] divides each by its support h(x) = max
 //! ⟨x, w_ij⟩, which puts it on the boundary of P whatever rounding did. So every value found is
 //! an upper bound of Q_l, and degenerate candidates (0/0) can do no harm. What could do harm are
 //! wrong signs: of force closure, which are told from rounding ([`Plane::closure`]), and of
 //! multipliers, where the triangle of contacts is flat or far from the centre of mass. Whatever is
 //! not clear beyond rounding is left to the expanding polytope.
 
-use super::apex_ray_face::Bounds;
+use super::apex_ray_face::Apexes;
 use super::instructions::instructions;
-use super::lanes::{dot, greatest};
-use super::plane::{Closure, LANES, Lanes, Plane, Table, Three, at, zeros};
-use super::r6::Twist;
-use super::ray_ray_ray::Forms;
+use super::lanes::greatest;
+use super::plane::{Closure, Plane, Three};
+use super::ray_ray_ray::Triples;
+use super::vertex::{Found, Question, Vertex};
 use crate::contact::FrictionCone;
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
-use std::ops::ControlFlow;
 
 /// Lever arms that are longer than this many times the shortest side or height of the triangle of
 /// contacts: the polytope errs less.
 const LONG_LEVERS: f64 = 1e3;
-/// Multipliers above minus this count as not negative: they are products of unit vectors.
-pub(super) const SLACK: f64 = 1e-13;
-/// Added to the squared determinant of a system: candidates with a determinant below 1e-14 are
-/// rounding noise unless their twist is huge all the same.
-pub(super) const TINY: f64 = 1e-28;
-/// Candidates this close to the longest so far (relative, by their squares) are looked at again:
-/// the quadratic forms that compare them cancel where the contacts are nearly collinear.
-pub(super) const TIE: f64 = 1e-6;
-
-/// The constraints that meet in a vertex of P, by contact and ray.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Active {
-    /// y_i on ray j_i of its cone, for all three.
-    Rays([usize; 3]),
-    /// y of the first contact at the apex, of the second on a ray, of the third on the face
-    /// orthogonal to an edge.
-    Apex {
-        apex: usize,
-        ray: (usize, usize),
-        edge: (usize, usize),
-    },
-}
-
-/// A vertex of P, or a point on an edge or face of P that rounding took for one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Vertex {
-    /// (v, ω) in the object frame, on the boundary of P.
-    pub twist: Twist,
-    /// ‖x‖².
-    pub norm_squared: f64,
-    /// Did the candidate satisfy all constraints to rounding before it was scaled?
-    pub exact: bool,
-    pub active: Active,
-}
-
-impl Vertex {
-    /// Distance of its facet from the origin.
-    #[inline]
-    pub fn quality(&self) -> f64 {
-        1.0 / self.norm_squared.sqrt()
-    }
-}
-
 /// The closed form cannot tell beyond rounding: the expanding polytope must.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Unclear;
-
-/// What to look for in P.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Question {
-    /// The longest twist.
-    Longest,
-    /// The longest, or any one that shows Q to be below this.
-    LongestUpTo(f64),
-    /// The longest that is longer than this (by its square).
-    LongerThan(f64),
-    /// All that are longer than this (by its square), but not more than so many.
-    All(f64, usize),
-}
 
 /// Working memory for the exact quality of grasps with three contacts.
 #[derive(Debug, Clone)]
@@ -95,18 +38,10 @@ pub(crate) struct Kernel {
     arch: Arch,
     /// For the planar test.
     narrow: Arch,
-    pub(super) plane: Plane,
-    /// Per ray of contacts 1 and 2: components along two sides of the triangle; see
-    /// [`Kernel::rays`].
-    pub(super) pairs: [Table<2>; 2],
-    /// Per ray of contact 3: components b, c along two sides and z out of the plane as b, c, b²,
-    /// bc, c², bz, cz, z².
-    pub(super) third: Table<8>,
-    pub(super) bounds: [Bounds; 3],
-    /// ‖x‖² of candidates; see [`Kernel::apexes`].
-    pub(super) squares: Vec<Lanes>,
-    pub(super) forms: Forms,
-    found: Vec<Vertex>,
+    plane: Plane,
+    apexes: Apexes,
+    triples: Triples,
+    found: Found,
 }
 
 impl Kernel {
@@ -118,12 +53,9 @@ impl Kernel {
             arch,
             narrow: narrow(arch),
             plane,
-            pairs: [zeros(edges), zeros(edges)],
-            third: zeros(edges),
-            bounds: std::array::from_fn(|_| Bounds::new(edges)),
-            squares: vec![Lanes::default(); 12 * edges.div_ceil(LANES)],
-            forms: Forms::default(),
-            found: Vec::new(),
+            apexes: Apexes::new(edges),
+            triples: Triples::new(edges),
+            found: Found::default(),
         }
     }
 
@@ -137,7 +69,7 @@ impl Kernel {
     #[inline]
     pub fn longest(&mut self, contacts: Three, center: DVec3) -> Result<Option<Vertex>, Unclear> {
         let closed = self.ask(contacts, center, Question::Longest)?;
-        Ok(closed.then(|| self.found[0]))
+        Ok(closed.then(|| self.found.vertices[0]))
     }
 
     /// As [`Kernel::longest`], but content with any twist longer than 1/`threshold`: one such is
@@ -150,7 +82,7 @@ impl Kernel {
         threshold: f64,
     ) -> Result<Option<Vertex>, Unclear> {
         let closed = self.ask(contacts, center, Question::LongestUpTo(threshold))?;
-        Ok(closed.then(|| self.found[0]))
+        Ok(closed.then(|| self.found.vertices[0]))
     }
 
     /// The longest twist if it is longer than 1/`threshold`, or about as long: `Some(None)` if Q is
@@ -165,7 +97,7 @@ impl Kernel {
         // A little less, so that rounding in the square does not decide what Q should.
         let limit = (1.0 - 1e-14) / (threshold * threshold);
         let closed = self.ask(contacts, center, Question::LongerThan(limit))?;
-        Ok(closed.then(|| self.found.first().copied()))
+        Ok(closed.then(|| self.found.vertices.first().copied()))
     }
 
     /// Vertices of P that belong to the facets of the hull within `distance` of the origin, at
@@ -184,25 +116,18 @@ impl Kernel {
         if matches!(closed, Ok(false)) {
             return Ok(None);
         }
-        self.found.retain(|vertex| vertex.exact);
-        if self.found.is_empty() && !self.ask(contacts, center, Question::Longest)? {
+        self.found.vertices.retain(|vertex| vertex.exact);
+        if self.found.vertices.is_empty() && !self.ask(contacts, center, Question::Longest)? {
             return Ok(None);
         }
-        self.sort_found(most);
-        Ok(Some(&self.found))
-    }
-
-    /// Longest first, the `most` longest.
-    fn sort_found(&mut self, most: usize) {
-        self.found
-            .sort_by(|a, b| b.norm_squared.total_cmp(&a.norm_squared));
-        self.found.truncate(most);
+        self.found.sort(most);
+        Ok(Some(&self.found.vertices))
     }
 
     /// Fills `found`; false where the grasp is not force closure.
     #[inline]
     fn ask(&mut self, contacts: Three, center: DVec3, question: Question) -> Result<bool, Unclear> {
-        self.found.clear();
+        self.found.vertices.clear();
         let plane = &mut self.plane;
         match self.narrow.dispatch(Closed { plane, contacts }) {
             Closure::No => return Ok(false),
@@ -223,66 +148,10 @@ impl Kernel {
         });
         // Of a grasp that is force closure there is a longest twist, unless rounding hid it.
         match question {
-            Question::Longest | Question::LongestUpTo(_) if self.found.is_empty() => Err(Unclear),
+            Question::Longest | Question::LongestUpTo(_) if self.found.vertices.is_empty() => {
+                Err(Unclear)
+            }
             _ => Ok(true),
-        }
-    }
-
-    /// Takes a proposed twist (in the frame of the plane) if, once it is on the boundary of P, it
-    /// is longer than the limit.
-    #[inline(always)]
-    pub(super) fn offer(
-        &mut self,
-        twist: Twist,
-        active: Active,
-        question: Question,
-        limit: &mut f64,
-    ) -> ControlFlow<()> {
-        let velocity = DVec3::new(twist[0], twist[1], twist[2]);
-        let omega = DVec3::new(twist[3], twist[4], twist[5]);
-        // The padding's zeros do no harm: the support is positive.
-        let mut supports = [0.0; LANES];
-        for side in &self.plane.sides {
-            let v = velocity + omega.cross(side.point.extend(0.0) - self.plane.center);
-            for [x, y, z] in &side.edge {
-                for lane in 0..LANES {
-                    let along = x[lane] * v.x + y[lane] * v.y + z[lane] * v.z;
-                    supports[lane] = greatest(along, supports[lane]);
-                }
-            }
-        }
-        let support = supports.into_iter().fold(0.0, greatest);
-        let norm_squared = dot(&twist, &twist) / (support * support);
-        // Negated so that NaN, from overflow, is refused; a support of 0 contradicts the test.
-        if !(support > 0.0 && norm_squared > *limit && norm_squared.is_finite()) {
-            return ControlFlow::Continue(());
-        }
-        let linear = self.plane.basis.mul_vec3(velocity / support);
-        let angular = self.plane.basis.mul_vec3(omega / support);
-        let vertex = Vertex {
-            twist: [
-                linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-            ],
-            norm_squared,
-            exact: (support - 1.0).abs() < 1e-9,
-            active,
-        };
-        if let Question::All(_, most) = question {
-            self.found.push(vertex);
-            if self.found.len() == 4 * most {
-                self.sort_found(2 * most);
-                *limit = self.found[2 * most - 1].norm_squared;
-            }
-            return ControlFlow::Continue(());
-        }
-        self.found.clear();
-        self.found.push(vertex);
-        *limit = norm_squared;
-        match question {
-            Question::LongestUpTo(threshold) if vertex.quality() < threshold => {
-                ControlFlow::Break(())
-            }
-            _ => ControlFlow::Continue(()),
         }
     }
 }
@@ -335,15 +204,18 @@ impl WithSimd for Ask<'_> {
             Question::All(limit, _) | Question::LongerThan(limit) => limit,
             _ => 0.0,
         };
-        if kernel.apexes(simd, question, &mut limit).is_continue() {
-            let _ = kernel.rays(simd, question, &mut limit);
+        let Kernel {
+            plane,
+            apexes,
+            triples,
+            found,
+            ..
+        } = kernel;
+        let apexes = apexes.look(simd, plane, question, &mut limit, found);
+        if apexes.is_continue() {
+            let _ = triples.look(simd, plane, question, &mut limit, found);
         }
     }
-}
-
-#[inline(always)]
-pub(super) fn ray(plane: &Plane, contact: usize, index: usize) -> DVec3 {
-    at(&plane.sides[contact].ray, index).into()
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Twists from velocities of the contacts, in the frame of the contact plane.
 
 use super::lanes::{Lane, Number, splat_each};
-use super::plane::Plane;
 use super::r6::Twist;
+use glam::{DVec2, DVec3};
 use pulp::Simd;
 
 /// Twists from velocities of the contacts, in the frame of the plane.
@@ -18,14 +18,14 @@ pub(super) struct Velocity<T> {
 
 impl Velocity<f64> {
     #[inline(always)]
-    pub(super) fn new(plane: &Plane) -> Self {
-        let third = plane.sides[2].point;
+    /// Of contacts at (0, 0), (`second`, 0) and `third` with these normals, and the centre of mass.
+    pub(super) fn new(normals: [DVec3; 3], second: f64, third: DVec2, center: DVec3) -> Self {
         Self {
-            normal: plane.sides.each_ref().map(|side| side.normal.to_array()),
-            inverse_p: 1.0 / plane.length()[0],
+            normal: normals.map(|normal| normal.to_array()),
+            inverse_p: 1.0 / second,
             inverse_s: 1.0 / third.y,
             q: third.x,
-            center: plane.center.to_array(),
+            center: center.to_array(),
         }
     }
 

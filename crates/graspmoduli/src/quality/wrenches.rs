@@ -1,7 +1,7 @@
 //! Wrench hulls of any number of contacts, by their farthest points.
 
-use super::polytope::{Levels, Support};
 use super::r6::{Twist, add, dot};
+use super::support::{Levels, Support};
 use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use glam::DVec3;
 
