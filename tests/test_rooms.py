@@ -1,6 +1,7 @@
 """The rooms of the package: the paper ← objects ← viewing ← experiments and the command line."""
 
 import ast
+import re
 from itertools import pairwise
 
 import pytest
@@ -90,3 +91,72 @@ def test_names_of_before_are_the_same_things():
     assert reading.read is files.read
     for name in ("grasps", "path", "quality", "row", "rows", "simplex", "surface"):
         assert getattr(plotting, f"plot_{name}") is getattr(pictures, f"plot_{name}")
+
+
+CORE = ROOT / "crates" / "graspmoduli" / "src"
+
+
+def rust_modules():
+    """Modules of the core by their paths, such as ("quality", "plane")."""
+    found = {}
+    for path in sorted(CORE.rglob("*.rs")):
+        parts = path.relative_to(CORE).with_suffix("").parts
+        found[tuple(part for part in parts if part not in ("mod", "lib"))] = path
+    return found
+
+
+def spelled_out(path):
+    """a::{b, c::{d}} as a::b and a::c::d."""
+    if "{" not in path:
+        return [path.strip()]
+    head, _, rest = path.partition("{")
+    parts, depth = [""], 0
+    for letter in rest[: rest.rindex("}")]:
+        depth += {"{": 1, "}": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [name for part in parts if part.strip() for name in spelled_out(head + part)]
+
+
+def used_in_rust(module, modules):
+    """Modules of the core that one uses outside of its tests; one that only gives names of its own
+    children to others does not count as using them."""
+    text = re.sub(r"//.*", "", modules[module].read_text().split("#[cfg(test)]")[0])
+    paths = re.findall(r"\buse ((?:crate|super)\b[^;]*);", text)
+    paths += re.findall(r"(?<![\w:])((?:crate|super)(?:::\w+)+)", text)
+    for path in paths:
+        for name in spelled_out(re.sub(r"\s", "", path)):
+            parts, base = name.split("::"), list(module)
+            if parts[0] == "crate":
+                base = []
+                del parts[0]
+            while parts and parts[0] == "super":
+                base.pop()
+                del parts[0]
+            whole = [*base, *(part for part in parts if part != "self")]
+            known = (tuple(whole[:k]) for k in range(len(whole), 0, -1))
+            found = next((m for m in known if m in modules and m != module), None)
+            if found is not None:
+                yield found
+
+
+def test_nor_is_there_one_in_the_core():
+    modules = rust_modules()
+    assert ("quality", "three_contacts") in modules
+    assert ("quality", "plane") in set(used_in_rust(("quality", "three_contacts"), modules))
+    uses = {module: set(used_in_rust(module, modules)) for module in modules}
+    # What nothing is left to use goes, again and again: what stays is in a circle or leads there.
+    while free := [m for m, others in uses.items() if not others & uses.keys()]:
+        for module in free:
+            del uses[module]
+    assert not uses, f"circles among {sorted('::'.join(m) for m in uses)}"
+
+
+def test_files_are_short():
+    lengths = [
+        len(p.read_text().splitlines()) for p in [*CORE.rglob("*.rs"), *PACKAGE.rglob("*.py")]
+    ]
+    assert max(lengths) <= 500
+    assert sorted(lengths)[len(lengths) // 2] <= 150

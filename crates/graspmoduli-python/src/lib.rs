@@ -7,10 +7,10 @@ mod pool;
 mod quality;
 mod touch;
 
-use graspmoduli::ascent::{Anywhere, Cells, Region};
 use graspmoduli::contact::{FrictionCone, Norm};
 use graspmoduli::distance;
 use graspmoduli::error::Error;
+use graspmoduli::region::{Anywhere, Cells, Region};
 use graspmoduli::search;
 use graspmoduli::synthesis;
 use graspmoduli::transfer::{Carried, Deformation, Schedule};

@@ -21,6 +21,7 @@
 //! | [`interpolation`] | splines through given values, banded systems |
 //! | [`sampling`] | area-uniform points |
 //! | [`search`] | the best of all subsets of contacts |
+//! | [`region`] | where on a surface contacts may lie |
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
@@ -32,6 +33,9 @@
 //!
 //! No global state: threads and random numbers are arguments.
 
+// Such links are for those who read the sources.
+#![allow(rustdoc::private_intra_doc_links)]
+
 pub mod ascent;
 pub mod contact;
 pub mod distance;
@@ -41,6 +45,7 @@ pub mod interpolation;
 pub mod math;
 mod nnls;
 pub mod quality;
+pub mod region;
 pub mod sampling;
 pub mod search;
 mod spline;

@@ -1,4 +1,4 @@
-//! Points distributed uniformly by area (Arvo's method, reference [2] of the paper).
+//! Points distributed uniformly by area (Arvo's method, reference 2 of the paper).
 
 use crate::surface::{Surface, simpson};
 use rayon::prelude::*;

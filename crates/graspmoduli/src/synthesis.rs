@@ -10,10 +10,11 @@
 //! choose among them: the starts are moved off symmetric places by a fixed small amount, and equal
 //! grasps come in a fixed order.
 
-use crate::ascent::{Climber, Coordinates, Effort, Region, grains, order};
+use crate::ascent::{Climber, Coordinates, Effort, grains, order};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::Evaluator;
+use crate::region::Region;
 use crate::sampling::by_area;
 use crate::search::{Ranked, best_of, best_subsets};
 use crate::surface::Surface;

@@ -1,9 +1,10 @@
 //! Carrying a grasp from one surface to another along (1 − t) S + t S' (Sec. IV.D).
 
-use crate::ascent::{Anywhere, Climber, Coordinates, Effort, Region, noticeably};
+use crate::ascent::{Climber, Coordinates, Effort, noticeably};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
 use crate::quality::{Evaluator, Gradient};
+use crate::region::{Anywhere, Region};
 use crate::surface::Surface;
 use glam::DVec3;
 use rayon::prelude::*;

@@ -3,10 +3,11 @@
 // What is tested does not hang on the last bit.
 #![allow(clippy::disallowed_methods)]
 
-use graspmoduli::ascent::{Anywhere, Cells, Coordinates, Region};
+use graspmoduli::ascent::Coordinates;
 use graspmoduli::contact::FrictionCone;
 use graspmoduli::error::Error;
 use graspmoduli::quality::Evaluator;
+use graspmoduli::region::{Anywhere, Cells, Region};
 use graspmoduli::surface::Surface;
 use graspmoduli::synthesis::{Synthesized, synthesize};
 use graspmoduli::transfer::{Carried, Deformation};

@@ -4,7 +4,7 @@ use super::OUTSIDE;
 use super::map::Place;
 use super::mesh::Mesh;
 use super::press::{ALIKE, Tip, land_along};
-use super::search::Wanted;
+use super::wanted::Wanted;
 use crate::contact::Frame;
 use crate::math;
 use crate::quality::Evaluator;

@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod polish;
 pub mod press;
 pub mod search;
+pub mod wanted;
 
 /// Farther than the mesh from the origin, whose size is 1: from there tips start.
 pub(crate) const OUTSIDE: f64 = 2.0;

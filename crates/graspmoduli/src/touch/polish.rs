@@ -3,7 +3,7 @@
 use super::map::{Place, place};
 use super::mesh::Mesh;
 use super::press::Tip;
-use super::search::Wanted;
+use super::wanted::Wanted;
 use crate::contact::Frame;
 use crate::math;
 use crate::quality::Evaluator;

@@ -5,7 +5,7 @@ use super::map::Place;
 use super::mesh::Mesh;
 use super::polish::{self, polish};
 use super::press::Tip;
-use crate::contact::{Contact, FrictionCone};
+use super::wanted::Wanted;
 use crate::error::Error;
 use crate::quality::Evaluator;
 use crate::search::best_subsets;
@@ -32,28 +32,6 @@ const SURE: f64 = 0.99;
 /// How many of the best subsets are looked at for each grasp that is wanted; then, if they are too
 /// much alike.
 const MANY: [usize; 2] = [40, 200];
-/// A step must raise the quality by this share of it.
-const GAIN: f64 = 1e-9;
-
-/// What is looked for, and with which fingers.
-#[derive(Debug, Clone)]
-pub struct Wanted<'a> {
-    /// The fingers' friction cones.
-    pub cone: &'a FrictionCone,
-    /// The object's centre of mass.
-    pub center: DVec3,
-    /// The size of the object over the length by which torques are divided.
-    pub scale: f64,
-    /// Contacts of a grasp.
-    pub fingers: usize,
-    /// How many grasps.
-    pub top: usize,
-    /// Of any two grasps at least one contact differs by this much.
-    pub apart: f64,
-    /// Errors of aim, a length, under which grasps are tried.
-    pub errors: f64,
-}
-
 /// A grasp of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -63,67 +41,6 @@ pub struct Found {
     pub quality: f64,
     /// What the mesh says of it.
     pub checked: Checked,
-}
-
-impl Wanted<'_> {
-    /// A contact as the quality sees it.
-    pub(crate) fn contact(&self, point: DVec3, normal: DVec3) -> Contact {
-        Contact {
-            point: (point - self.center) * self.scale,
-            normal,
-        }
-    }
-
-    fn contacts(&self, places: &[Place]) -> Vec<Contact> {
-        places
-            .iter()
-            .map(|place| self.contact(place.point, place.normal))
-            .collect()
-    }
-
-    /// Q_l of fingers that press at places.
-    pub(crate) fn quality(&self, evaluator: &mut Evaluator, places: &[Place]) -> f64 {
-        evaluator.quality(&self.contacts(places), DVec3::ZERO)
-    }
-
-    /// Q_l if it is more than `best`.
-    pub(crate) fn better(
-        &self,
-        evaluator: &mut Evaluator,
-        places: &[Place],
-        best: f64,
-    ) -> Option<f64> {
-        let bar = best * (1.0 + GAIN);
-        let quality = evaluator.quality_up_to(&self.contacts(places), DVec3::ZERO, bar);
-        (quality > bar).then_some(quality)
-    }
-
-    /// How many grasps are polished.
-    fn candidates(&self) -> usize {
-        2 * self.top + 2
-    }
-
-    /// Do two grasps differ, in whatever order their contacts are compared?
-    fn differ(&self, one: &[Place], other: &[Place]) -> bool {
-        !matched(one, other, self.apart, &mut vec![false; other.len()])
-    }
-}
-
-/// Can contacts be paired so that no pair is `apart`?
-fn matched(one: &[Place], other: &[Place], apart: f64, taken: &mut [bool]) -> bool {
-    let Some((first, rest)) = one.split_first() else {
-        return true;
-    };
-    for k in 0..other.len() {
-        if !taken[k] && (first.point - other[k].point).length() <= apart {
-            taken[k] = true;
-            if matched(rest, other, apart, taken) {
-                return true;
-            }
-            taken[k] = false;
-        }
-    }
-    false
 }
 
 /// Different grasps among the places of a map, true ones by what [`gate`] asks, best first; more

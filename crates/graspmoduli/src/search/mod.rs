@@ -16,8 +16,10 @@ use glam::DVec3;
 use multiversion::multiversion;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, PoisonError};
-use std::time::Duration;
+
+mod board;
+
+use board::{Board, Leave, Running};
 
 const WORDS: usize = 4;
 /// One bit per direction.
@@ -29,9 +31,6 @@ const DIRECTIONS: usize = 64 * WORDS;
 /// the expanding polytope, which is less than this: what is passed over cannot depend on the order
 /// in which threads come by.
 const MARGIN: f64 = 2.0 * LARGEST_ERROR;
-
-/// Between two calls of the progress function.
-const TICK: Duration = Duration::from_millis(100);
 
 /// Some of the given contacts, by index, and their Q_l.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,48 +117,6 @@ pub fn best_subsets(
     Ok(board.into_best())
 }
 
-/// How many workers are at work.
-struct Running {
-    number: Mutex<usize>,
-    changed: Condvar,
-}
-
-impl Running {
-    fn new(number: usize) -> Self {
-        Self {
-            number: Mutex::new(number),
-            changed: Condvar::new(),
-        }
-    }
-
-    /// Waits a little for all workers to end.
-    fn is_over(&self) -> bool {
-        let number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
-        if *number == 0 {
-            return true;
-        }
-        let (number, _) = self
-            .changed
-            .wait_timeout(number, TICK)
-            .unwrap_or_else(PoisonError::into_inner);
-        *number == 0
-    }
-}
-
-/// Counts a worker out, also one that panics, for which nobody must wait.
-struct Leave<'a>(&'a Running);
-
-impl Drop for Leave<'_> {
-    fn drop(&mut self) {
-        let running = self.0;
-        *running
-            .number
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner) -= 1;
-        running.changed.notify_one();
-    }
-}
-
 /// The same for some triples only, in the order in which they are worth trying; on this thread.
 pub(crate) fn best_of(
     contacts: &[Contact],
@@ -188,53 +145,6 @@ fn subsets(n: usize, k: usize) -> u64 {
         product.checked_mul(n as u128 - i).map(|p| p / (i + 1))
     });
     product.map_or(u64::MAX, |p| u64::try_from(p).unwrap_or(u64::MAX))
-}
-
-/// The best so far, shared by all workers.
-struct Board {
-    top: usize,
-    best: Mutex<Vec<Ranked>>,
-    /// Bits of the quality that a grasp must reach to enter; positive floats order as integers.
-    threshold: AtomicU64,
-}
-
-impl Board {
-    fn new(top: usize) -> Self {
-        Self {
-            top,
-            best: Mutex::new(Vec::new()),
-            threshold: AtomicU64::new(0),
-        }
-    }
-
-    fn threshold(&self) -> f64 {
-        f64::from_bits(self.threshold.load(Ordering::Relaxed))
-    }
-
-    fn offer(&self, candidate: Ranked) {
-        let mut best = self.best.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = best.partition_point(|other| {
-            (-other.quality, &other.indices) < (-candidate.quality, &candidate.indices)
-        });
-        if best
-            .get(place)
-            .is_some_and(|other| other.indices == candidate.indices)
-        {
-            return;
-        }
-        best.insert(place, candidate);
-        best.truncate(self.top);
-        if best.len() == self.top {
-            let lowest = best[self.top - 1].quality;
-            self.threshold.store(lowest.to_bits(), Ordering::Relaxed);
-        }
-    }
-
-    fn into_best(self) -> Vec<Ranked> {
-        self.best
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 #[derive(Clone)]
@@ -519,21 +429,6 @@ fn supports(wrenches: &[Twist], per_contact: usize, direction: &Twist) -> Vec<f6
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nobody_waits_for_a_worker_that_panicked() {
-        let running = Running::new(2);
-        std::thread::scope(|scope| {
-            let panics = scope.spawn(|| {
-                let _guard = Leave(&running);
-                panic!("a worker's end, which the test wants");
-            });
-            assert!(panics.join().is_err());
-            assert!(!running.is_over());
-            drop(Leave(&running));
-            assert!(running.is_over());
-        });
-    }
 
     #[test]
     fn numbers_of_subsets_do_not_overflow() {

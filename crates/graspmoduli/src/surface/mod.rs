@@ -8,19 +8,16 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// Most spline intervals per direction, and most coefficients, of a common refinement: a surface
-/// of that many takes 16 MB.
-const MOST_INTERVALS: usize = 8192;
-const MOST_COEFFICIENTS: usize = 1 << 21;
+mod cone;
+mod integrals;
+mod revolution;
+
+pub(crate) use integrals::simpson;
 
 /// Lengths between these, in the unit of the object, are exact to rounding in all that is computed
 /// from them: products of six neither overflow nor vanish.
 const SHORTEST: f64 = 1e-50;
 const LONGEST: f64 = 1e50;
-
-/// How far a refined coefficient is from the exact one, relative to the largest coefficient: by
-/// nine rounded steps in each direction.
-const REFINED: f64 = 128.0 * f64::EPSILON;
 
 /// c(u, θ) = (f cos θ, f sin θ, (1 − u) a + u b) with f a tensor product of uniform cubic
 /// B-splines, clamped in u and periodic in θ. All coefficients are positive, hence f > 0.
@@ -258,120 +255,6 @@ impl Surface {
             .collect()
     }
 
-    /// Area, volume and centres of mass, by Gauss–Legendre quadrature on every spline patch.
-    pub fn integrals(&self) -> &Integrals {
-        self.integrals.get_or_init(|| {
-            let cells = |basis: &Basis, length: f64| -> Vec<(f64, f64)> {
-                let n = basis.intervals();
-                // Short splines get more cells, so that the quadrature's error stays small.
-                let parts = (24_usize).div_ceil(n) * n;
-                let half = 0.5 * length / parts as f64;
-                let gauss = (0.6_f64).sqrt();
-                (0..parts)
-                    .flat_map(|i| {
-                        let middle = (2 * i + 1) as f64 * half;
-                        [(-gauss, 5.0 / 9.0), (0.0, 8.0 / 9.0), (gauss, 5.0 / 9.0)]
-                            .map(|(x, weight)| (middle + x * half, weight * half))
-                    })
-                    .collect()
-            };
-            self.integrate(&cells(&self.u_basis, 1.0), &cells(&self.theta_basis, TAU))
-        })
-    }
-
-    /// The same by Simpson's rule, as in the paper (60 steps in each direction in IV.B, 20 in IV.E).
-    /// The rule wants an even number, so an odd one counts as the next.
-    pub fn integrals_by_simpson(&self, steps: usize) -> Integrals {
-        let steps = steps.max(2).next_multiple_of(2);
-        let rule = |length: f64| -> Vec<(f64, f64)> {
-            simpson(steps)
-                .enumerate()
-                .map(|(i, weight)| {
-                    let step = length / steps as f64;
-                    (i as f64 * step, weight * step)
-                })
-                .collect()
-        };
-        self.integrate(&rule(1.0), &rule(TAU))
-    }
-
-    fn integrate(&self, us: &[(f64, f64)], thetas: &[(f64, f64)]) -> Integrals {
-        let thetas: Vec<(Local, f64, f64, f64)> = thetas
-            .iter()
-            .map(|&(theta, weight)| {
-                let (sin, cos) = math::sin_cos(theta);
-                (self.theta_basis.at(theta / TAU), sin, cos, weight)
-            })
-            .collect();
-        let h = self.top - self.bottom;
-        let (mut area, mut volume) = (0.0, 0.0);
-        let (mut moment, mut solid) = (DVec3::ZERO, DVec3::ZERO);
-        for &(u, u_weight) in us {
-            let at = self.u_basis.at(u);
-            let z = self.height(u);
-            for (theta, sin, cos, weight) in &thetas {
-                let radius = self.contract(&at, theta);
-                let f = radius.value;
-                let share = u_weight * weight * self.density(&radius);
-                let point = DVec3::new(f * cos, f * sin, z);
-                area += share;
-                moment += point * share;
-                // Over a wedge from the axis to f: its volume, and its centroid at 2f/3.
-                let wedge = u_weight * weight * 0.5 * h * f * f;
-                volume += wedge;
-                let planar = point.truncate() * (2.0 / 3.0);
-                solid += planar.extend(z) * wedge;
-            }
-        }
-        Integrals {
-            area,
-            center_of_mass: moment / area,
-            volume,
-            solid_center_of_mass: solid / volume,
-        }
-    }
-
-    /// Σ weight·S in the convex cone of surfaces (Lemma III.1): exact to rounding, on the
-    /// coefficients, once all are written on a common refinement of their grids; an error where that
-    /// is too large. Weights are positive.
-    pub fn combine(terms: &[(f64, &Surface)]) -> Result<Self, Error> {
-        let (intervals, columns) = common_grid(terms.iter().map(|&(_, surface)| surface))?;
-        let mut sum = vec![0.0; (intervals + 3) * columns];
-        let (mut bottom, mut top) = (0.0, 0.0);
-        for &(weight, surface) in terms {
-            if !(weight.is_finite() && weight > 0.0) {
-                return Err(Error::Weight(weight));
-            }
-            bottom += weight * surface.bottom;
-            top += weight * surface.top;
-            let refined = surface.refined(intervals, columns);
-            for (total, coefficient) in sum.iter_mut().zip(refined) {
-                *total += weight * coefficient;
-            }
-        }
-        Self::new(bottom, top, columns, sum)
-    }
-
-    /// Both surfaces, unchanged, on a common refinement of their grids.
-    pub(crate) fn on_common_grid(&self, other: &Self) -> Result<(Self, Self), Error> {
-        let (intervals, columns) = common_grid([self, other])?;
-        let on_grid = |s: &Self| Self::new(s.bottom, s.top, columns, s.refined(intervals, columns));
-        Ok((on_grid(self)?, on_grid(other)?))
-    }
-
-    /// (1 − t) S + t S' of surfaces on the same grid, 0 ≤ t ≤ 1.
-    pub(crate) fn towards(&self, other: &Self, t: f64) -> Self {
-        let mix = |a: f64, b: f64| (1.0 - t) * a + t * b;
-        let pairs = self.coefficients.iter().zip(&other.coefficients);
-        Self {
-            bottom: mix(self.bottom, other.bottom),
-            top: mix(self.top, other.top),
-            coefficients: pairs.map(|(&a, &b)| mix(a, b)).collect(),
-            integrals: OnceLock::new(),
-            ..self.clone()
-        }
-    }
-
     /// Bézier control points of the radius on the patch of an interval in u and a column: rows along u.
     pub(crate) fn bezier_net(&self, interval: usize, column: usize) -> [[f64; 4]; 4] {
         let along_u = self.u_basis.bezier(interval);
@@ -405,35 +288,8 @@ impl Surface {
         range
     }
 
-    /// Is it a surface of revolution, to rounding?
-    pub fn is_revolution(&self) -> bool {
-        self.as_revolution().is_some()
-    }
-
-    /// The surface on the smallest periodic grid, if to rounding it is one of revolution, and by how
-    /// much its coefficients differ from that.
-    pub(crate) fn as_revolution(&self) -> Option<(Self, f64)> {
-        let projected = self.project();
-        let means = projected.coefficients.chunks_exact(projected.columns);
-        let rows = self.coefficients.chunks_exact(self.columns);
-        let deviation = rows
-            .zip(means)
-            .flat_map(|(row, mean)| row.iter().map(|c| (c - mean[0]).abs()))
-            .fold(0.0, f64::max);
-        (deviation <= 1e-14 * self.largest_coefficient()).then_some((projected, deviation))
-    }
-
     pub(crate) fn largest_coefficient(&self) -> f64 {
         self.coefficients.iter().fold(0.0, |m: f64, &c| m.max(c))
-    }
-
-    /// By how much the coefficients of `self.on_common_grid(other)` may be off.
-    pub(crate) fn refinement_error(&self, refined: &Self) -> f64 {
-        if self.shape() == refined.shape() {
-            0.0
-        } else {
-            REFINED * self.largest_coefficient()
-        }
     }
 
     /// A function on the same grid with other coefficients, of any sign: no surface.
@@ -443,82 +299,6 @@ impl Surface {
             integrals: OnceLock::new(),
             ..self.clone()
         }
-    }
-
-    /// Coefficients on a grid of so many intervals in u and θ, multiples of the present ones.
-    fn refined(&self, intervals: usize, columns: usize) -> Vec<f64> {
-        let mut rows: Vec<Vec<f64>> = self
-            .coefficients
-            .chunks_exact(self.columns)
-            .map(<[f64]>::to_vec)
-            .collect();
-        if columns != self.columns {
-            let factor = columns / self.columns;
-            rows = rows
-                .iter()
-                .map(|row| self.theta_basis.refine(factor, row))
-                .collect();
-        }
-        if intervals == self.u_basis.intervals() {
-            return rows.concat();
-        }
-        let factor = intervals / self.u_basis.intervals();
-        let mut out = vec![0.0; (intervals + 3) * columns];
-        for column in 0..columns {
-            let line: Vec<f64> = rows.iter().map(|row| row[column]).collect();
-            for (i, value) in self.u_basis.refine(factor, &line).into_iter().enumerate() {
-                out[i * columns + column] = value;
-            }
-        }
-        out
-    }
-
-    /// π(S): the surface of revolution whose radius is the mean over θ (Sec. IV.E), which is the
-    /// mean of the coefficients.
-    pub fn project(&self) -> Self {
-        let columns = 4;
-        let means = self.row_means();
-        Self {
-            coefficients: means.into_iter().flat_map(|mean| [mean; 4]).collect(),
-            columns,
-            theta_basis: Basis::new(columns, true),
-            integrals: OnceLock::new(),
-            ..self.clone()
-        }
-    }
-
-    /// (1 − t) π(S) + t S, the path from the projection to the surface, 0 ≤ t ≤ 1.
-    pub fn from_projection(&self, t: f64) -> Self {
-        let means = self.row_means();
-        let rows = self.coefficients.chunks_exact(self.columns);
-        Self {
-            coefficients: rows
-                .zip(means)
-                .flat_map(|(row, mean)| row.iter().map(move |c| (1.0 - t) * mean + t * c))
-                .collect(),
-            integrals: OnceLock::new(),
-            ..self.clone()
-        }
-    }
-
-    /// Is the radius the same all around, to 1.5 % on average?
-    pub fn is_round(&self) -> bool {
-        let means = self.row_means();
-        let deviation: f64 = self
-            .coefficients
-            .chunks_exact(self.columns)
-            .zip(&means)
-            .map(|(row, mean)| row.iter().map(|c| (c - mean).abs()).sum::<f64>())
-            .sum();
-        deviation < 0.015 * means.iter().sum::<f64>() * self.columns as f64
-    }
-
-    /// The mean of each row; where all of it is the same number, that.
-    fn row_means(&self) -> Vec<f64> {
-        self.coefficients
-            .chunks_exact(self.columns)
-            .map(|row| row[0] + row.iter().map(|c| c - row[0]).sum::<f64>() / row.len() as f64)
-            .collect()
     }
 
     /// Largest distance of the surface from a point, on a grid of `steps` by `steps`.
@@ -546,40 +326,6 @@ fn reduced(theta: f64) -> f64 {
 
 fn out_of_range(length: &f64) -> bool {
     !(SHORTEST..=LONGEST).contains(length)
-}
-
-/// Simpson's weights for `steps` steps of unit length.
-pub(crate) fn simpson(steps: usize) -> impl Iterator<Item = f64> {
-    (0..=steps).map(move |i| match i {
-        0 => 1.0 / 3.0,
-        i if i == steps => 1.0 / 3.0,
-        i if i % 2 == 1 => 4.0 / 3.0,
-        _ => 2.0 / 3.0,
-    })
-}
-
-/// Intervals in u and θ of the coarsest grid that refines all surfaces' grids.
-fn common_grid<'a>(
-    surfaces: impl IntoIterator<Item = &'a Surface>,
-) -> Result<(usize, usize), Error> {
-    let (mut intervals, mut columns) = (1, 1);
-    for surface in surfaces {
-        intervals = least_common_multiple(intervals, surface.u_basis.intervals());
-        columns = least_common_multiple(columns, surface.columns);
-    }
-    let coefficients = (intervals.saturating_add(3)).saturating_mul(columns);
-    if intervals > MOST_INTERVALS || columns > MOST_INTERVALS || coefficients > MOST_COEFFICIENTS {
-        return Err(Error::GridTooLarge(intervals, columns));
-    }
-    Ok((intervals, columns))
-}
-
-fn least_common_multiple(a: usize, b: usize) -> usize {
-    let (mut x, mut y) = (a, b);
-    while y != 0 {
-        (x, y) = (y, x % y);
-    }
-    (a / x).saturating_mul(b)
 }
 
 #[cfg(test)]
