@@ -21,7 +21,7 @@ test: $(READY) ## Every test that is quick, Rust and Python
 	cargo test --release --quiet --package graspmoduli --features objects
 	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser \
 	    --ignore python/graspmoduli/torch.py --ignore python/graspmoduli/jax.py \
-	    --ignore python/graspmoduli/viewing/viewer.py -m 'not long' python tests
+	    --ignore python/graspmoduli/viewing/browser -m 'not long' python tests
 
 test-long: $(READY) ## The tests that take longer: whole runs, killed runs, damaged files
 	$(BIN)/pytest --numprocesses auto --ignore tests/extras --ignore tests/browser -m long tests

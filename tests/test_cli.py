@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import graspmoduli as gm
 from conftest import ROOT
 from graspmoduli import cli
+from graspmoduli.cli import table
 
 BOTTLE = ROOT / "examples" / "objects" / "baby_bottle.ply"
 
@@ -160,7 +161,7 @@ def test_no_zero_is_negative(capsys):
     tiny = dataclasses.replace(grasp, contacts=np.full((3, 3), -1e-9))
     pose = fit.pose.copy()
     pose[:3, 2] = [-1e-9, -1e-9, -1.0]
-    cli._print("can.npy", dataclasses.replace(fit, pose=pose), [tiny], 8)
+    table.show("can.npy", dataclasses.replace(fit, pose=pose), [tiny], 8)
     output = capsys.readouterr().out
     assert "axis (+0.00, +0.00, -1.00)" in output
     assert output.count("  0.000, 0.000, 0.000") == 3

@@ -23,11 +23,13 @@ from graspmoduli.experiments import (
     EXPERIMENTS,
     FAMILIES,
     NAMES,
-    carrying,
-    deformations,
+    fig8,
+    fig9,
+    fig10,
+    fig11,
+    fig12,
     random_grasps,
     reproduce,
-    revolution,
     store,
 )
 from graspmoduli.experiments.common import over_seeds
@@ -178,7 +180,7 @@ class TestWorstNeighbours:
             assert gm.quality(grasp, **options) >= 0.02
             assert gm.quality(near, **options) == found.smallest
         scale = replace(TINY, friction=0.3, edges=5)
-        chosen = random_grasps._good(0.05, scale)
+        chosen = random_grasps.good_grasps(0.05, scale)
         assert (gm.quality(*split(chosen), friction=0.3, edges=5) >= 0.05).all()
 
     def test_nothing_within_the_proven_radius_is_lost(self, good):
@@ -206,21 +208,21 @@ def verdict(outcome, start):
 @pytest.fixture(scope="module")
 def piece():
     """Fig. 8 of one seed."""
-    return deformations.fig8_piece(0, TINY)
+    return fig8.fig8_piece(0, TINY)
 
 
 @pytest.mark.long
 class TestDeformations:
     def test_stay_in_the_ball_that_they_name(self, piece):
-        surface = deformations._start()
+        surface = fig8._start()
         grasp = gm.Grasp(*piece["grasp"])
         reached = []
-        for reach in deformations.REACHES:
-            for kind in deformations.KINDS:
-                for ball in deformations.BALLS:
+        for reach in fig8.REACHES:
+            for kind in fig8.KINDS:
+                for ball in fig8.BALLS:
                     # Every fifth: the distance of surfaces takes its time.
-                    for case in piece["moved"][deformations._key(ball, reach, kind)][::2]:
-                        target = deformations.deformed(surface, case["weights"], case["towards"])
+                    for case in piece["moved"][fig8._key(ball, reach, kind)][::2]:
+                        target = fig8.deformed(surface, case["weights"], case["towards"])
                         moved = gm.Grasp(*case["grasp"])
                         apart = gm.distance((surface, grasp), (target, moved))
                         placed = gm.place(target, moved)
@@ -228,7 +230,7 @@ class TestDeformations:
                         assert apart + apart.error <= case["distance"] * (1 + 1e-9)
                         assert gm.surface_distance(surface, target) <= reach
                         assert gm.quality(placed) == case["quality"]
-                        if ball == deformations.MODULI:
+                        if ball == fig8.MODULI:
                             assert case["distance"] <= reach
                             reached.append(case["distance"] / reach)
                         else:
@@ -246,16 +248,16 @@ class TestDeformations:
             for case in cases:
                 case["quality"] = 0.2
         bad = json.loads(json.dumps(good))
-        bad["moved"][deformations._key(deformations.MODULI, 0.3, "combined")][7]["quality"] = 0.19
+        bad["moved"][fig8._key(fig8.MODULI, 0.3, "combined")][7]["quality"] = 0.19
         start = "smallest Q₈ of 10 deformations of each kind with d((g, S), (g′, S′)) ≤ 0.3"
-        assert verdict(deformations.fig8({"fig8": [good] * 3}, {}, THREE), start) is True
-        assert verdict(deformations.fig8({"fig8": [good, bad, good]}, {}, THREE), start) is False
+        assert verdict(fig8.fig8({"fig8": [good] * 3}, {}, THREE), start) is True
+        assert verdict(fig8.fig8({"fig8": [good, bad, good]}, {}, THREE), start) is False
 
     def test_pictures_tell_their_distance(self, piece):
-        figure = deformations._fig8_picture(piece)
+        figure = fig8._fig8_picture(piece)
         titles = [axes.get_title() for axes in figure.axes]
         assert titles[0].startswith("the grasp\nd = 0\nQ = ")
-        for title, kind in zip(titles[1:], deformations.KINDS, strict=True):
+        for title, kind in zip(titles[1:], fig8.KINDS, strict=True):
             name, d, q = title.split("\n")
             assert name == kind
             assert 0.95 * 0.3 < float(d.removeprefix("d = ")) <= 0.3
@@ -286,10 +288,10 @@ class TestDeformations:
                 low = max(bounds.lower[k] - bounds.upper[k + len(c)],
                           bounds.lower[k + len(c)] - bounds.upper[k])  # fmt: skip
                 slope = low / gm.placed_distance(p, q)
-                assert slope <= deformations.lipschitz_constant(friction, lever)
+                assert slope <= fig9.lipschitz_constant(friction, lever)
                 steepest = max(steepest, slope)
         # The constant is not far from what happens.
-        assert steepest > 0.05 * deformations.lipschitz_constant(friction, 2.0)
+        assert steepest > 0.05 * fig9.lipschitz_constant(friction, 2.0)
 
     def test_polygons_are_not_lipschitz_at_the_pole(self, good):
         drop, grasp, near = steepest_at_the_pole(good[0.2])
@@ -315,7 +317,7 @@ class TestDeformations:
 
         def outcome(*runs, drop=0.0):
             found = {"fig9": list(runs), "poles": [{"drop": drop, "distance": 1e-9}]}
-            return deformations.fig9(found, {}, THREE)
+            return fig9.fig9(found, {}, THREE)
 
         fine = pieces(10, 6)
         for runs, kind, wanted in (
@@ -339,15 +341,15 @@ class TestTransfers:
             return {
                 method: {"quality": values, "evaluations": 7, "seconds": 0.0}
                 for method, values in zip(
-                    carrying.METHODS, (naive, gradient, gradient, gradient), strict=True
+                    fig10.METHODS, (naive, gradient, gradient, gradient), strict=True
                 )
             }
 
         fine = [piece([0.1] * 11 + [0.0], [0.2] * 12)] * 36
         lost = [*fine[:-1], piece([0.1] * 12, [0.2] * 11 + [0.0])]
         start = "transfers by the paper's gradient method, h = 1e-5 that end"
-        assert verdict(carrying.fig10({"fig10": fine}, {}, THREE), start) is True
-        outcome = carrying.fig10({"fig10": lost}, {}, THREE)
+        assert verdict(fig10.fig10({"fig10": fine}, {}, THREE), start) is True
+        outcome = fig10.fig10({"fig10": lost}, {}, THREE)
         assert verdict(outcome, start) is False
         (row,) = [row for row in outcome.rows if row.what.startswith(start)]
         assert row.ours == "143 to 144 of 144, in the mean 143.7"
@@ -355,8 +357,8 @@ class TestTransfers:
     def test_the_papers_method_takes_finite_differences(self):
         source, grasp = gm.shapes.MODELS["a"], gm.Grasp([0.2, 0.5, 0.8], [0.1, 2.2, 4.1])
         counts = []
-        for name in (carrying.PAPERS, carrying.EXACT):
-            method, difference = carrying.METHODS[name]
+        for name in (fig10.PAPERS, fig10.EXACT):
+            method, difference = fig10.METHODS[name]
             end = gm.transfer(source, grasp, gm.shapes.MODELS["b"], method, difference=difference)
             counts.append(end.evaluations)
         assert counts[0] > 6 * counts[1]
@@ -377,26 +379,26 @@ class TestRevolution:
     def test_how_far_from_a_plane_with_the_axis(self, theta, degrees):
         for turn in (0.0, 1.0, 200.0):
             grasp = gm.Grasp([0.5] * 3, np.radians(theta) + turn)
-            assert np.degrees(revolution.off_plane(grasp)) == pytest.approx(degrees, abs=1e-9)
+            assert np.degrees(fig11.off_plane(grasp)) == pytest.approx(degrees, abs=1e-9)
 
     def test_best_grasps_of_a_and_b_are_in_a_plane_and_those_of_c_and_d_are_not(self):
-        off = [np.degrees(revolution.axis_piece(k, TINY)["off"]) for k in range(4)]
+        off = [np.degrees(fig11.axis_piece(k, TINY)["off"]) for k in range(4)]
         assert max(off[:2]) < 20.0
         assert min(off[2:]) > 40.0
 
     def test_seeds_are_repetitions_with_another_seed(self):
         for k in range(4):
-            again = revolution.axis_piece(k, replace(TINY, seed=1))
-            assert revolution.axis_piece(4 + k, THREE) == again
-        assert revolution.axis_piece(0, THREE) != revolution.axis_piece(4, THREE)
+            again = fig11.axis_piece(k, replace(TINY, seed=1))
+            assert fig11.axis_piece(4 + k, THREE) == again
+        assert fig11.axis_piece(0, THREE) != fig11.axis_piece(4, THREE)
 
     def test_heights_have_as_many_triples_as_they_say(self):
-        for heights, triples in revolution.TRIPLES.items():
+        for heights, triples in fig11.TRIPLES.items():
             assert heights * (heights * (heights - 1) // 2) == triples
 
     def test_deformation_starts_from_every_angle(self):
         # On the elliptic model, the angle matters.
-        found = revolution.fig12_piece(revolution.UNEVEN.index("f"), TINY)["deformation"]
+        found = fig12.fig12_piece(fig12.UNEVEN.index("f"), TINY)["deformation"]
         assert len(found) == 24
         assert max(found) > 1.5 * np.mean(found)
         assert found[0] > 1.5 * np.mean(found)
@@ -410,7 +412,7 @@ class TestRevolution:
                     {"brute": brute[k // 8], "ours": 0.3, "seconds": seconds} for k in range(24)
                 ],
             }
-            return revolution.fig12(found, {}, THREE)
+            return fig12.fig12(found, {}, THREE)
 
         start = "mean Q₈ of deformation"
         # One angle of 24 above exhaustive search changes nothing.

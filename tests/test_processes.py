@@ -17,8 +17,8 @@ import pytest
 
 import graspmoduli as gm
 from conftest import ROOT
-from graspmoduli import cli
 from graspmoduli._files import check_output, replacing
+from graspmoduli.cli import table
 
 BOTTLE = ROOT / "examples" / "objects" / "baby_bottle.ply"
 COMMAND = [sys.executable, "-m", "graspmoduli"]
@@ -193,7 +193,7 @@ class TestStreams:
         ours, theirs = os.openpty()
         with os.fdopen(theirs, "w") as screen:
             monkeypatch.setattr(sys, "stdout", screen)
-            cli._print("can.npy", found[0], found[1], 8)
+            table.show("can.npy", found[0], found[1], 8)
             monkeypatch.undo()
         text = b""
         # The other end is closed: what it left, then an error.

@@ -8,7 +8,7 @@ from scipy.interpolate import make_interp_spline
 
 import graspmoduli as gm
 from graspmoduli import _core
-from graspmoduli.surfaces import _greville, clamped_knots
+from graspmoduli.splines import clamped_knots, greville
 
 BITS = "1b99b1d71076a512691b2d4557f542095a4bd7ddfd0bcd0165a53a4b9b036622"
 
@@ -33,7 +33,7 @@ def test_models_lie_in_the_unit_ball_and_have_two_names(name):
 def test_interpolation_is_scipys(shape):
     intervals, columns = shape
     values = np.random.default_rng(intervals).uniform(1.0, 2.0, (intervals + 3, columns))
-    sites, knots = _greville(intervals), clamped_knots(intervals)
+    sites, knots = greville(intervals), clamped_knots(intervals)
     rows = make_interp_spline(sites, values, k=3, t=knots).c
     # Row j of the system in θ is (1, 4, 1)/6 at j, j + 1, j + 2.
     ring = np.eye(columns)

@@ -11,7 +11,8 @@ from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp, place
 from .moduli import surface_distance
 from .quality import circular_quality
-from .surfaces import Surface, _what, a_surface
+from .splines import what
+from .surfaces import Surface, a_surface
 
 #: How far the bounds of the circular quality are driven together, relative to the upper one.
 TOLERANCE = 1e-2
@@ -47,7 +48,7 @@ def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int =
     True
     """
     if not isinstance(placed, PlacedGrasp):
-        raise GraspModuliError(f"placed must be a PlacedGrasp, got {_what(placed)}")
+        raise GraspModuliError(f"placed must be a PlacedGrasp, got {what(placed)}")
     mu, l = cone(friction, edges)
     inscribed = mu * np.cos(np.pi / l)
     center = placed.contacts.mean(0)
@@ -111,7 +112,7 @@ def certify_transfer(
     True
     """
     if not isinstance(grasp, Grasp):
-        raise GraspModuliError(f"grasp must be a Grasp, got {_what(grasp)}")
+        raise GraspModuliError(f"grasp must be a Grasp, got {what(grasp)}")
     p = place(a_surface("source", source), grasp)
     q = place(a_surface("target", target), grasp)
     moved = [

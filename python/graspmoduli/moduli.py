@@ -12,7 +12,8 @@ from . import _core
 from ._arrays import Floats, brief, count, floats, locked, number
 from ._core import GraspModuliError, sin
 from .grasps import Grasp, PlacedGrasp
-from .surfaces import Surface, _what, a_surface, combine, some_surfaces
+from .splines import what
+from .surfaces import Surface, a_surface, combine, some_surfaces
 
 #: A point of the Grasp Moduli Space: a surface and a grasp on it.
 Point = tuple[Surface, Grasp]
@@ -182,11 +183,11 @@ def interpolate(start: Point, end: Point, t: ArrayLike) -> Point | list[Point]:
 def a_point(name: str, value: Any) -> Point:
     """``value`` if it is a point of the moduli space, a surface and a grasp on it."""
     if not isinstance(value, list | tuple) or len(value) != 2:
-        raise GraspModuliError(f"{name} must be a pair (surface, grasp), got {_what(value)}")
+        raise GraspModuliError(f"{name} must be a pair (surface, grasp), got {what(value)}")
     surface, grasp = value
     if not isinstance(surface, Surface) or not isinstance(grasp, Grasp):
         raise GraspModuliError(
-            f"{name} must be a pair (surface, grasp), got {_what(surface)} and {_what(grasp)}"
+            f"{name} must be a pair (surface, grasp), got {what(surface)} and {what(grasp)}"
         )
     return surface, grasp
 
@@ -213,7 +214,7 @@ def placed_distance(p: PlacedGrasp, q: PlacedGrasp) -> float:
     """
     for name, value in (("p", p), ("q", q)):
         if not isinstance(value, PlacedGrasp):
-            raise GraspModuliError(f"{name} must be a PlacedGrasp, got {_what(value)}")
+            raise GraspModuliError(f"{name} must be a PlacedGrasp, got {what(value)}")
     same_number(p, q)
     return max(
         float(np.linalg.norm(p.contacts - q.contacts, axis=1).max()),

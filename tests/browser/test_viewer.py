@@ -17,7 +17,10 @@ import graspmoduli as gm
 from conftest import ROOT
 from graspmoduli.objects.fitting import fit_object
 from graspmoduli.objects.reading import read
-from graspmoduli.viewing import viewer
+from graspmoduli.viewing.browser import pointing
+from graspmoduli.viewing.browser.grasp_page import GraspPage
+from graspmoduli.viewing.browser.server import open_server
+from graspmoduli.viewing.browser.shapes_page import ShapePage
 
 OBJECT = ROOT / "examples" / "objects" / "yogurt_bottle.ply"
 #: Software rendering, and nothing fetched behind our back.
@@ -56,12 +59,12 @@ def found():
 @pytest.fixture
 def served(found):
     """A server and the pages that it made, in the order of their browsers."""
-    server = viewer.open_server(0)
+    server = open_server(0)
     pages = []
 
     @server.on_client_connect
     def _(client):
-        pages.append(viewer.GraspPage(client, *found, 1.0, 8, "bottle"))
+        pages.append(GraspPage(client, *found, 1.0, 8, "bottle"))
 
     yield f"http://127.0.0.1:{server.get_port()}", pages
     server.stop()
@@ -248,12 +251,12 @@ def test_the_ascent_never_ends_lower_than_it_starts(served, browser, found):
 
 @pytest.mark.parametrize(("friction", "edges"), [(0.05, 64), (0.77, 8), (3.3, 3)])
 def test_any_friction_and_edges_are_those_that_are_asked_for(browser, found, friction, edges):
-    server = viewer.open_server(0)
+    server = open_server(0)
     pages = []
 
     @server.on_client_connect
     def _(client):
-        pages.append(viewer.GraspPage(client, *found, friction, edges, "bottle"))
+        pages.append(GraspPage(client, *found, friction, edges, "bottle"))
 
     window = Window(browser, f"http://127.0.0.1:{server.get_port()}")
     window.page.wait_for_selector("[data-quality]", timeout=60_000)
@@ -266,12 +269,12 @@ def test_any_friction_and_edges_are_those_that_are_asked_for(browser, found, fri
 
 
 def test_the_space_of_shapes(browser):
-    server = viewer.open_server(0)
+    server = open_server(0)
     pages = []
 
     @server.on_client_connect
     def _(client):
-        pages.append(viewer.ShapePage(client, {}))
+        pages.append(ShapePage(client, {}))
 
     window = Window(browser, f"http://127.0.0.1:{server.get_port()}")
     window.page.wait_for_selector("[data-quality]", timeout=60_000)
@@ -356,10 +359,10 @@ def test_barycentric_coordinates_stay_in_the_triangle():
     rng = np.random.default_rng(3)
     for weights in rng.dirichlet(np.ones(3), 20):
         np.testing.assert_allclose(
-            viewer.barycentric(weights @ viewer.TRIANGLE), weights, atol=1e-12
+            pointing.barycentric(weights @ pointing.TRIANGLE), weights, atol=1e-12
         )
     for point in 5.0 * rng.normal(size=(50, 3)) * [1, 0, 1]:
-        weights = viewer.barycentric(point)
+        weights = pointing.barycentric(point)
         assert (weights >= 0.0).all()
         assert weights.sum() == pytest.approx(1.0)
 
@@ -372,5 +375,5 @@ def test_a_ray_meets_the_surface_where_it_is():
         point, normal = surface.points(u, theta), surface.normals(u, theta)
         if (eye - point) @ -normal < 0.8:
             continue
-        found = surface.points(*viewer.under_pointer(surface, eye, point))
+        found = surface.points(*pointing.under_pointer(surface, eye, point))
         assert np.linalg.norm(found - point) < 0.02

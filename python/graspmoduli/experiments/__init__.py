@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from .._arrays import cores, count
 from .._core import GraspModuliError
 from ..shapes import MODELS
-from . import carrying, deformations, pictures, random_grasps, revolution
+from . import fig1_to_4, fig5, fig6, fig7, fig8, fig9, fig10, fig11, fig12, random_grasps
 from .cluster import run_on_dask
 from .engine import run_on_threads
 from .report import Outcome, Row, write
@@ -56,34 +56,32 @@ FAMILIES: dict[str, Family] = {
     "worst05": Family(lambda s: random_grasps.worst_pieces(0.05), _worst(0.05)),
     "worst20": Family(lambda s: random_grasps.worst_pieces(0.2), _worst(0.2)),
     "poles": Family(lambda s: 1, random_grasps.poles),
-    "fig8": Family(lambda s: s.seeds, deformations.fig8_piece),
-    "fig9": Family(lambda s: s.seeds * len(s.fig9_sources), deformations.fig9_piece),
-    "fig10": Family(lambda s: s.seeds * len(MODELS), carrying.fig10_piece),
-    "axis": Family(lambda s: s.seeds * len(revolution.ROUND_MODELS), revolution.axis_piece),
-    "fig11": Family(
-        lambda s: s.seeds * revolution.ROUND // revolution.ROUND_PIECE, revolution.fig11_piece
-    ),
-    "fig12": Family(lambda s: len(revolution.UNEVEN), revolution.fig12_piece),
-    "search12": Family(lambda s: s.seeds * len(revolution.UNEVEN), revolution.search_piece),
+    "fig8": Family(lambda s: s.seeds, fig8.fig8_piece),
+    "fig9": Family(lambda s: s.seeds * len(s.fig9_sources), fig9.fig9_piece),
+    "fig10": Family(lambda s: s.seeds * len(MODELS), fig10.fig10_piece),
+    "axis": Family(lambda s: s.seeds * len(fig11.ROUND_MODELS), fig11.axis_piece),
+    "fig11": Family(lambda s: s.seeds * fig11.ROUND // fig11.ROUND_PIECE, fig11.fig11_piece),
+    "fig12": Family(lambda s: len(fig12.UNEVEN), fig12.fig12_piece),
+    "search12": Family(lambda s: s.seeds * len(fig12.UNEVEN), fig12.search_piece),
 }
 
 EXPERIMENTS: dict[str, Experiment] = {
-    "fig1": Experiment("a simplex of shapes", (), pictures.fig1),
-    "fig2": Experiment("the twelve models", (), pictures.fig2),
-    "fig3": Experiment("random shapes between them", (), pictures.fig3),
-    "fig4": Experiment("a curve in the Grasp Moduli Space", (), pictures.fig4),
-    "fig5": Experiment("uniform grasps in D(1)", ("survey",), random_grasps.fig5),
-    "fig6": Experiment("a neighbourhood of a grasp", (), random_grasps.fig6),
+    "fig1": Experiment("a simplex of shapes", (), fig1_to_4.fig1),
+    "fig2": Experiment("the twelve models", (), fig1_to_4.fig2),
+    "fig3": Experiment("random shapes between them", (), fig1_to_4.fig3),
+    "fig4": Experiment("a curve in the Grasp Moduli Space", (), fig1_to_4.fig4),
+    "fig5": Experiment("uniform grasps in D(1)", ("survey",), fig5.fig5),
+    "fig6": Experiment("a neighbourhood of a grasp", (), fig6.fig6),
     "fig7": Experiment(
         "the smallest quality near good grasps",
         ("near05", "near20", "worst05", "worst20"),
-        random_grasps.fig7,
+        fig7.fig7,
     ),
-    "fig8": Experiment("small deformations of one grasp", ("fig8",), deformations.fig8),
-    "fig9": Experiment("quality along transfers", ("fig9", "poles"), deformations.fig9),
-    "fig10": Experiment("144 transfers", ("fig10",), carrying.fig10),
-    "fig11": Experiment("surfaces of revolution", ("axis", "fig11"), revolution.fig11),
-    "fig12": Experiment("synthesis by deformation", ("fig12", "search12"), revolution.fig12),
+    "fig8": Experiment("small deformations of one grasp", ("fig8",), fig8.fig8),
+    "fig9": Experiment("quality along transfers", ("fig9", "poles"), fig9.fig9),
+    "fig10": Experiment("144 transfers", ("fig10",), fig10.fig10),
+    "fig11": Experiment("surfaces of revolution", ("axis", "fig11"), fig11.fig11),
+    "fig12": Experiment("synthesis by deformation", ("fig12", "search12"), fig12.fig12),
 }
 
 #: Every number of the text in one table, without pictures.

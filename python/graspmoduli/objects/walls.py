@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._core import GraspModuliError, arctan2, cos, sin, solve_banded
-from ..surfaces import Surface, clamped_knots
+from ..splines import clamped_knots
+from ..surfaces import Surface
 from .reading import Object
 
 #: A point this close to the fitted surface, relative to the object's size, is explained by it.

@@ -1,0 +1,42 @@
+"""From a file to grasps, and to their picture."""
+
+from __future__ import annotations
+
+import io
+import logging
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+
+def find_grasps(
+    path: str, options: dict[str, Any], step: Callable[[str, float], None]
+) -> tuple[Any, Any, Any]:
+    """What was read, its fit, and its grasps."""
+    step("reading", 0.0)
+    from ..objects.reading import read
+
+    thing = read(path)
+    step("fitting", 0.1)
+    from ..objects.fitting import fit_object
+
+    fit = fit_object(thing, lambda done, total: step("fitting", 0.1 + 0.65 * done / total))
+    step("finding grasps", 0.8)
+    return thing, fit, fit.synthesize(**options)
+
+
+def image_of(path: Path, thing: str, found: Any, friction: float, edges: int) -> bytes:
+    """The bytes of a picture, in the format of the file's name."""
+    from ..viewing.plotting import plot_grasps
+
+    # Dollars would start a formula; what is no character of any language cannot be drawn.
+    title = Path(thing).name.replace("$", "\\$").encode("utf-8", "replace").decode()
+    figure = plot_grasps(*found, friction=friction, edges=edges, title=title)
+    # Characters that no font has are drawn as boxes, without a word.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    buffer = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        figure.savefig(buffer, format=path.suffix[1:].lower())
+    return buffer.getvalue()

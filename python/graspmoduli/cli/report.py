@@ -1,0 +1,65 @@
+"""What ``graspmoduli grasp --json`` writes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+#: The version of what ``grasp --json`` writes; docs/object.md describes it.
+SCHEMA = 1
+
+
+def report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> dict[str, Any]:
+    """The whole file, as docs/object.md describes it."""
+    return {
+        "schema": SCHEMA,
+        "object": path,
+        "fit": {
+            "residual_rms": fit.residual.rms,
+            "residual_max": fit.residual.max,
+            "size": fit.residual.size,
+            "coverage": fit.coverage,
+            "unexplained": fit.unexplained,
+            "pose": fit.pose.tolist(),
+        },
+        "friction": friction,
+        "edges": edges,
+        "length_scale": fit.length_scale,
+        "center_of_mass_of": _center_of(fit),
+        "note": "contacts, normals and center_of_mass are in the coordinates of the object's "
+        "file; quality is that of lengths divided by length_scale",
+        "grasps": [_grasp_report(grasp) for grasp in grasps],
+    }
+
+
+def _center_of(fit: Any) -> str:
+    """What the centre of mass is that of, if none was given."""
+    if fit.mesh is None:
+        return "fitted surface"
+    return "solid" if fit.mesh.shape.closed else "triangles"
+
+
+def _grasp_report(grasp: Any) -> dict[str, Any]:
+    coordinates = [
+        [None if math.isnan(x) else x for x in column] for column in grasp.coordinates.T.tolist()
+    ]
+    report = {
+        "quality": grasp.quality,
+        "round_quality": list(grasp.round_quality),
+        "contacts": grasp.contacts.tolist(),
+        "normals": grasp.normals.tolist(),
+        "center_of_mass": grasp.center_of_mass.tolist(),
+        "u": coordinates[0],
+        "theta": coordinates[1],
+    }
+    if grasp.checks is not None:
+        report["exact_quality"] = grasp.exact_quality
+        report["low_quality"] = grasp.low_quality
+        report["held"] = grasp.held
+        report["checks"] = [
+            # The fitted surface is the only part that is known.
+            {**dataclasses.asdict(check), "part": None if u is None else 0}
+            for check, u in zip(grasp.checks, coordinates[0], strict=True)
+        ]
+    return report
