@@ -51,7 +51,10 @@ portable: $(READY) ## The same answers under every instruction set of this machi
 
 lint: $(READY) ## Formatting, clippy, ruff, types and the stubs of the binding
 	cargo fmt --check
-	cargo clippy --release --all-targets --quiet -- --deny warnings
+	cargo clippy --release --all-targets --quiet --features graspmoduli/objects -- --deny warnings
+	cargo clippy --release --quiet --package graspmoduli --no-default-features -- --deny warnings
+	RUSTDOCFLAGS='--deny warnings' cargo doc --quiet --no-deps --package graspmoduli --features objects
+	cargo package --quiet --package graspmoduli --allow-dirty --no-verify
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright

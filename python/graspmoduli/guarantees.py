@@ -6,18 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import _core
 from ._arrays import cone
+from ._batches import batch
 from ._core import GraspModuliError
 from .grasps import Grasp, PlacedGrasp, place
-from .moduli import surface_distance
-from .quality import circular_quality
 from .splines import what
 from .surfaces import Surface, a_surface
 
-#: How far the bounds of the circular quality are driven together, relative to the upper one.
-TOLERANCE = 1e-2
-#: Units of length tried for torques, in lever arms.
-UNITS = (0.25, 0.5, 1.0, 2.0, 4.0)
+#: Relative error of d(S, T) in a bound: that which surface_distance has unless told otherwise.
+ACCURACY = 1e-6
 
 
 def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int = 8) -> float:
@@ -49,27 +47,9 @@ def certified_radius(placed: PlacedGrasp, *, friction: float = 1.0, edges: int =
     """
     if not isinstance(placed, PlacedGrasp):
         raise GraspModuliError(f"placed must be a PlacedGrasp, got {what(placed)}")
-    mu, l = cone(friction, edges)
-    inscribed = mu * np.cos(np.pi / l)
-    center = placed.contacts.mean(0)
-    reach = float(np.linalg.norm(placed.contacts - center, axis=1).max())
-    best = 0.0
-    for unit in UNITS:
-        length = unit * reach
-        if not length > 0.0:
-            break
-        bounds = circular_quality(
-            placed.contacts / length,
-            placed.normals,
-            center / length,
-            friction=inscribed,
-            tolerance=TOLERANCE,
-        )
-        # Forces move by ‖f‖ρ, torques about the centre by ‖f‖(1 + ‖r‖)ρ.
-        speed = np.hypot(1.0, inscribed) * np.hypot(1.0, (1.0 + reach) / length)
-        best = max(best, float(bounds.lower / speed))
-    # Rounding, in the bounds and in the division.
-    return best * (1.0 - 1e-9)
+    cone(friction, edges)
+    grasp = batch(placed.contacts, placed.normals, placed.center_of_mass, friction, edges, 0.0, 1.0)
+    return _core.certified_radius(grasp.arrays, grasp.cone)
 
 
 @dataclass(frozen=True)
@@ -138,9 +118,5 @@ def transfer_bound(source: Surface, target: Surface) -> float:
     >>> gm.transfer_bound(bottle, 1.01 * bottle) < 0.02
     True
     """
-    apart = surface_distance(a_surface("source", source), a_surface("target", target))
-    moved = np.linalg.norm([source.center_of_mass - target.center_of_mass], axis=1)[0]
-    # Rounding of the points and normals that a grasp is placed with.
-    extent = max(np.abs([s.bottom, s.top]).max() + s.coefficients.max() for s in (source, target))
-    rounding = 1e-12 * max(apart, float(moved)) + (4e-15 * extent if apart > 0.0 else 0.0)
-    return float(max(apart + apart.error, float(moved)) + rounding)
+    start, end = a_surface("source", source), a_surface("target", target)
+    return _core.transfer_bound(start._core, end._core, ACCURACY)

@@ -10,6 +10,7 @@ mod touch;
 use graspmoduli::contact::{FrictionCone, Norm};
 use graspmoduli::distance;
 use graspmoduli::error::Error;
+use graspmoduli::guarantees;
 use graspmoduli::region::{Anywhere, Cells, Region};
 use graspmoduli::search;
 use graspmoduli::synthesis;
@@ -316,20 +317,43 @@ fn surface_distance(
     tolerance: f64,
 ) -> PyResult<(f64, f64, [f64; 2])> {
     let (first, second) = (&first.get().0, &second.get().0);
+    let found = heeding_signals(py, |progress| {
+        distance::surface_distance(first, second, tolerance, progress)
+    })?;
+    Ok((found.value, found.error, found.at))
+}
+
+/// How far any grasp moves by the naïve transfer: d(S, S'), or the way of the centre of mass.
+#[pyfunction]
+fn transfer_bound(
+    py: Python<'_>,
+    source: Py<Surface>,
+    target: Py<Surface>,
+    tolerance: f64,
+) -> PyResult<f64> {
+    let (source, target) = (&source.get().0, &target.get().0);
+    heeding_signals(py, |progress| {
+        guarantees::transfer_bound(source, target, tolerance, progress)
+    })
+}
+
+/// Releases the interpreter for work that asks now and then whether to go on: not after Ctrl-C.
+fn heeding_signals<R: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&mut dyn FnMut() -> ControlFlow<()>) -> Result<R, Error> + Send,
+) -> PyResult<R> {
     let mut failure = None;
     let result = py.detach(|| {
-        distance::surface_distance(first, second, tolerance, || {
-            match Python::attach(|py| py.check_signals()) {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(error) => {
-                    failure = Some(error);
-                    ControlFlow::Break(())
-                }
+        work(&mut || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                failure = Some(error);
+                ControlFlow::Break(())
             }
         })
     });
     match (result, failure) {
-        (Ok(found), _) => Ok((found.value, found.error, found.at)),
+        (Ok(found), _) => Ok(found),
         (Err(_), Some(error)) => Err(error),
         (Err(error), None) => Err(raise(error)),
     }
@@ -447,14 +471,14 @@ mod _core {
     use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
     #[pymodule_export]
     use super::quality::{
-        circular_quality, contact_forces, extreme_quality, is_clean, quality, quality_at_least,
-        quality_gradient, quality_of_one, tangents, weakest,
+        certified_radius, circular_quality, contact_forces, extreme_quality, is_clean, quality,
+        quality_at_least, quality_gradient, quality_of_one, tangents, weakest,
     };
     #[pymodule_export]
     use super::touch::Mesh;
     #[pymodule_export]
     use super::{
         GraspModuliError, PyDeformation, Surface, best_subsets, combine, sample_points,
-        surface_distance, synthesize,
+        surface_distance, synthesize, transfer_bound,
     };
 }

@@ -4,6 +4,7 @@ use crate::pool::{detached, interruptible};
 use crate::{Cone, raise, table, vectors};
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
 use graspmoduli::error::Error;
+use graspmoduli::guarantees;
 use graspmoduli::quality::{Batch, Evaluator, Gradient};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -309,6 +310,13 @@ pub fn weakest(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<(f64,
         Evaluator::new(&cone).weakest(&contacts, batch.centers[0].into())
     });
     Ok((weakest.quality, weakest.direction))
+}
+
+/// A proven radius of the first grasp.
+#[pyfunction]
+pub fn certified_radius(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<f64> {
+    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    Ok(py.detach(|| guarantees::certified_radius(&contacts(batch.points, batch.normals), &cone)))
 }
 
 pub fn contacts(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<Contact> {

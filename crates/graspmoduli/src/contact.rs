@@ -14,6 +14,28 @@ pub struct Contact {
     pub normal: DVec3,
 }
 
+impl Contact {
+    /// A contact at a point, with a unit normal that points into the object; an error where a
+    /// coordinate is not finite or the normal's length is off by more than 1e-4.
+    pub fn new(point: DVec3, normal: DVec3) -> Result<Self, Error> {
+        if !point.is_finite() {
+            return Err(Error::Point {
+                got: point.to_array(),
+            });
+        }
+        let length = normal.length();
+        // Not so either where it is not a number.
+        let is_unit = (length - 1.0).abs() <= 1e-4;
+        if !is_unit {
+            return Err(Error::Normal { length });
+        }
+        Ok(Self {
+            point,
+            normal: normal / length,
+        })
+    }
+}
+
 /// What a unit of strength of the fingers means (Sec. II of the paper).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Norm {
@@ -52,15 +74,15 @@ impl FrictionCone {
     /// Cones with a friction coefficient for each contact; a single one is that of all.
     pub fn each(frictions: &[f64], edges: usize) -> Result<Self, Error> {
         if frictions.is_empty() {
-            return Err(Error::Friction(f64::NAN));
+            return Err(Error::Friction { got: f64::NAN });
         }
         for &friction in frictions {
             if !(friction.is_finite() && friction >= 0.0) {
-                return Err(Error::Friction(friction));
+                return Err(Error::Friction { got: friction });
             }
         }
         if edges < 3 {
-            return Err(Error::Edges(edges));
+            return Err(Error::Edges { got: edges });
         }
         let at = |turns: f64| {
             let (sin, cos) = math::sin_cos(TAU * turns / edges as f64);
@@ -82,7 +104,7 @@ impl FrictionCone {
     /// the wrenches (n, r × n ± γ n) join those of the edges.
     pub fn soft(self, torsion: f64) -> Result<Self, Error> {
         if !(torsion.is_finite() && torsion >= 0.0) {
-            return Err(Error::Torsion(torsion));
+            return Err(Error::Torsion { got: torsion });
         }
         Ok(Self { torsion, ..self })
     }
@@ -131,6 +153,21 @@ impl FrictionCone {
             frictions: vec![least],
             ..self.clone()
         }
+    }
+
+    /// Hard fingers whose circular cones are inscribed in these polygons, however they are turned.
+    pub(crate) fn inscribed(&self) -> Self {
+        Self {
+            frictions: self.frictions.iter().map(|mu| mu * self.inner).collect(),
+            torsion: 0.0,
+            norm: Norm::Sum,
+            ..self.clone()
+        }
+    }
+
+    /// The largest of the friction coefficients.
+    pub(crate) fn steepest(&self) -> f64 {
+        self.frictions.iter().copied().fold(0.0, f64::max)
     }
 
     /// Have all contacts the same friction?

@@ -168,7 +168,7 @@ pub fn survey(
     width: f64,
 ) -> Result<Survey, Error> {
     if bins == 0 {
-        return Err(Error::Bins(bins));
+        return Err(Error::Bins { got: bins });
     }
     let mut evaluator = Evaluator::new(cone);
     let mut found = Survey {

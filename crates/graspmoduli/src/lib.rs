@@ -25,13 +25,32 @@
 //! | [`ascent`] | ascent of $Q_l$ on a surface |
 //! | [`synthesis`] | grasps from scratch, by deformation from a surface of revolution |
 //! | [`distance`] | the distance between two surfaces, with a proven error bound |
-//! | [`domain`] | random grasps in the domain D(1), and near each other |
+//! | [`guarantees`] | how far a grasp may move and is still proven to hold |
+//! | `domain` | random grasps in the domain D(1), and near each other: with the feature `rand` |
 //! | [`transfer`] | carrying grasps from one surface to another |
 //! | `touch` | fingertips pressed on triangle meshes, and grasps of them: with the feature `objects` |
 //! | [`math`] | sine, cosine and the like, the same on every processor |
 //! | [`error`] | what can be wrong with a request |
 //!
-//! No global state: threads and random numbers are arguments.
+//! No global state: random numbers are arguments, and so are threads: what runs in parallel does so on
+//! those of the caller, see [`on_threads`].
+//!
+//! ```
+//! use graspmoduli::glam::DVec3;
+//! use graspmoduli::{Contact, Evaluator, FrictionCone};
+//!
+//! // Three fingers around a disc of radius 1, pressing towards its centre.
+//! let contacts = [0.0_f64, 120.0, 240.0].map(|degrees| {
+//!     let (sin, cos) = graspmoduli::math::sin_cos(degrees.to_radians());
+//!     Contact::new(DVec3::new(cos, sin, 0.0), DVec3::new(-cos, -sin, 0.0))
+//! });
+//! let [a, b, c] = contacts;
+//! let contacts = [a?, b?, c?];
+//! let cone = FrictionCone::new(1.0, 8)?;
+//! let quality = Evaluator::new(&cone).quality(&contacts, DVec3::ZERO);
+//! assert!((quality - 0.544232187).abs() < 1e-9);
+//! # Ok::<(), graspmoduli::Error>(())
+//! ```
 
 // Such links are for those who read the sources.
 #![allow(rustdoc::private_intra_doc_links)]
@@ -39,11 +58,14 @@
 pub mod ascent;
 pub mod contact;
 pub mod distance;
+#[cfg(feature = "rand")]
 pub mod domain;
 pub mod error;
+pub mod guarantees;
 pub mod interpolation;
 pub mod math;
 mod nnls;
+mod parallel;
 pub mod quality;
 pub mod region;
 pub mod sampling;
@@ -54,3 +76,16 @@ pub mod synthesis;
 #[cfg(feature = "objects")]
 pub mod touch;
 pub mod transfer;
+
+pub use contact::{Contact, FrictionCone, Norm};
+pub use error::Error;
+pub use glam;
+#[cfg(feature = "rayon")]
+pub use parallel::on_threads;
+pub use quality::{Batch, Evaluator, Gradient, Weakest};
+pub use surface::Surface;
+
+// What the README shows runs, too.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
 //! Points distributed uniformly by area (Arvo's method, reference 2 of the paper).
 
+use crate::parallel::*;
 use crate::surface::{Surface, simpson};
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Bisection steps per inverted coordinate, as in the paper (IV.B).

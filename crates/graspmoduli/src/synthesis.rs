@@ -13,13 +13,13 @@
 use crate::ascent::{Climber, Coordinates, Effort, grains, order};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
+use crate::parallel::*;
 use crate::quality::Evaluator;
 use crate::region::Region;
 use crate::sampling::by_area;
 use crate::search::{Ranked, best_of, best_subsets};
 use crate::surface::Surface;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,7 +81,7 @@ pub fn synthesize(
     stop: &AtomicBool,
 ) -> Result<Vec<Synthesized>, Error> {
     // Within the thread pool from the start: entering it once per stage costs as much as a stage.
-    rayon::scope(|_| {
+    entered(|| {
         within_pool(
             surface,
             center_of_mass,

@@ -3,11 +3,11 @@
 use crate::ascent::{Climber, Coordinates, Effort, noticeably};
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
+use crate::parallel::*;
 use crate::quality::{Evaluator, Gradient};
 use crate::region::{Anywhere, Region};
 use crate::surface::Surface;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 

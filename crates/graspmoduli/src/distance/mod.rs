@@ -90,7 +90,7 @@ pub fn surface_distance(
     mut progress: impl FnMut() -> ControlFlow<()>,
 ) -> Result<SurfaceDistance, Error> {
     if tolerance.is_nan() || tolerance <= 0.0 {
-        return Err(Error::Tolerance(tolerance));
+        return Err(Error::Tolerance { got: tolerance });
     }
     let mut pair = Pair::new(first, second)?;
     let mut best = Best {

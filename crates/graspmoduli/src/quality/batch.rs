@@ -4,8 +4,8 @@ use super::evaluator::Evaluator;
 use super::gradient::Gradient;
 use crate::contact::{Contact, FrictionCone};
 use crate::error::Error;
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Grasps in one piece of memory: of grasp g, contact i is `points[g·m + i]`.

@@ -24,7 +24,7 @@ impl Surface {
         let (mut bottom, mut top) = (0.0, 0.0);
         for &(weight, surface) in terms {
             if !(weight.is_finite() && weight > 0.0) {
-                return Err(Error::Weight(weight));
+                return Err(Error::Weight { got: weight });
             }
             bottom += weight * surface.bottom;
             top += weight * surface.top;
@@ -105,7 +105,10 @@ fn common_grid<'a>(
     }
     let coefficients = (intervals.saturating_add(3)).saturating_mul(columns);
     if intervals > MOST_INTERVALS || columns > MOST_INTERVALS || coefficients > MOST_COEFFICIENTS {
-        return Err(Error::GridTooLarge(intervals, columns));
+        return Err(Error::GridTooLarge {
+            rows: intervals,
+            columns,
+        });
     }
     Ok((intervals, columns))
 }

@@ -93,26 +93,33 @@ impl Surface {
         coefficients: Vec<f64>,
     ) -> Result<Self, Error> {
         if !(bottom.is_finite() && top.is_finite() && bottom < top) {
-            return Err(Error::Heights(bottom, top));
+            return Err(Error::Heights { bottom, top });
         }
         let farthest = bottom.abs().max(top.abs());
         if let Some(&length) = [top - bottom, farthest].iter().find(|l| out_of_range(l)) {
-            return Err(Error::Length(length));
+            return Err(Error::Length { got: length });
         }
         let rows = coefficients.len() / columns.max(1);
         if rows < 4 || columns < 4 {
-            return Err(Error::CoefficientShape(rows, columns));
+            return Err(Error::CoefficientShape { rows, columns });
         }
         if rows * columns != coefficients.len() {
-            return Err(Error::CoefficientCount(rows * columns, coefficients.len()));
+            return Err(Error::CoefficientCount {
+                wanted: rows * columns,
+                got: coefficients.len(),
+            });
         }
         let wrong = |c: &f64| !(c.is_finite() && *c > 0.0);
         if let Some(index) = coefficients.iter().position(wrong) {
             let value = coefficients[index];
-            return Err(Error::Coefficient(index / columns, index % columns, value));
+            return Err(Error::Coefficient {
+                row: index / columns,
+                column: index % columns,
+                got: value,
+            });
         }
         if let Some(&length) = coefficients.iter().find(|c| out_of_range(c)) {
-            return Err(Error::Length(length));
+            return Err(Error::Length { got: length });
         }
         Ok(Self {
             bottom,

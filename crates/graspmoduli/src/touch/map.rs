@@ -2,8 +2,8 @@
 
 use super::mesh::Mesh;
 use super::press::{ALIKE, Pressed, Tip, land_along};
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// A sample is seen from outside if the ray along its normal lands this close to it.
 const SEEN: f64 = 3e-3;

@@ -7,10 +7,10 @@ use super::polish::{self, polish};
 use super::press::Tip;
 use super::wanted::Wanted;
 use crate::error::Error;
+use crate::parallel::*;
 use crate::quality::Evaluator;
 use crate::search::best_subsets;
 use glam::DVec3;
-use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
