@@ -1,6 +1,6 @@
 //! Random grasps in the domain D(1) and near each other.
 
-use crate::{cone, raise, table};
+use crate::{Cone, raise, table};
 use graspmoduli::contact::Contact;
 use graspmoduli::domain::{self, Configuration, Stream};
 use numpy::{
@@ -124,7 +124,7 @@ pub fn survey(
     bins: usize,
     width: f64,
 ) -> PyResult<Surveyed> {
-    let cone = cone(friction, edges, 0.0)?;
+    let Cone(cone) = Cone::new(&[friction], edges, 0.0, false)?;
     let found = py.detach(|| {
         let mut stream = Stream::new(seed, number);
         domain::survey(&mut stream, count, &cone, &thresholds, bins, width)
@@ -154,7 +154,7 @@ pub fn smallest_nearby(
     samples: usize,
     neighbourhoods: Vec<(f64, u64)>,
 ) -> PyResult<(u64, Vec<f64>)> {
-    let cone = cone(friction, edges, 0.0)?;
+    let Cone(cone) = Cone::new(&[friction], edges, 0.0, false)?;
     Ok(py.detach(|| {
         let mut streams: Vec<_> = neighbourhoods
             .into_iter()

@@ -7,6 +7,7 @@
 use crate::raise;
 use graspmoduli::error::Error;
 use pyo3::prelude::*;
+use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::process::id;
 use std::sync::OnceLock;
@@ -37,6 +38,28 @@ const TICK: Duration = Duration::from_millis(50);
 /// Releases the interpreter and computes; parallel work may be part of it.
 pub fn detached<R: Send>(py: Python<'_>, task: impl FnOnce() -> R + Send) -> R {
     py.detach(|| pooled(task))
+}
+
+/// Releases the interpreter for work that asks now and then whether to go on: not after Ctrl-C.
+pub fn heeding_signals<R: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&mut dyn FnMut() -> ControlFlow<()>) -> Result<R, Error> + Send,
+) -> PyResult<R> {
+    let mut failure = None;
+    let result = py.detach(|| {
+        work(&mut || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                failure = Some(error);
+                ControlFlow::Break(())
+            }
+        })
+    });
+    match (result, failure) {
+        (Ok(found), _) => Ok(found),
+        (Err(_), Some(error)) => Err(error),
+        (Err(error), None) => Err(raise(error)),
+    }
 }
 
 /// The same for work of seconds and more, on a thread of its own, while this one waits for

@@ -165,7 +165,7 @@ pub fn quality_of_one(
         LAST.with_borrow_mut(|last| {
             let mut evaluator = match last.take() {
                 Some((known, its, evaluator)) if known == cone && its == each => evaluator,
-                _ => Evaluator::new(&Cone(vec![friction], edges as usize, torsion, each).build()?),
+                _ => Evaluator::new(&Cone::new(&[friction], edges as usize, torsion, each)?.0),
             };
             let value = evaluator.quality(&contacts, center.into());
             // An error with its sentence is the careful way's, too.
@@ -231,7 +231,7 @@ pub fn quality<'py>(
     grasps: Grasps<'py>,
     cone: Cone,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     let mut out = vec![0.0; batch.centers.len()];
     computed(py, batch, |batch| batch.quality(&cone, &mut out))?;
     Ok(PyArray1::from_vec(py, out))
@@ -244,7 +244,7 @@ pub fn quality_gradient<'py>(
     grasps: Grasps<'py>,
     cone: Cone,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     let width = Gradient::width(grasps.0.as_array().shape()[1]);
     let mut out = vec![0.0; batch.centers.len() * width];
     computed(py, batch, |batch| batch.gradient(&cone, &mut out))?;
@@ -259,7 +259,7 @@ pub fn quality_at_least<'py>(
     cone: Cone,
     threshold: f64,
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     let mut out = vec![false; batch.centers.len()];
     computed(py, batch, |batch| {
         batch.is_at_least(&cone, threshold, &mut out)
@@ -275,7 +275,7 @@ pub fn extreme_quality(
     cone: Cone,
     largest: bool,
 ) -> PyResult<Option<(usize, f64)>> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     computed(py, batch, |batch| {
         if largest {
             batch.largest(&cone)
@@ -293,7 +293,7 @@ pub fn circular_quality<'py>(
     cone: Cone,
     tolerance: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     let mut out = vec![[0.0; 2]; batch.centers.len()];
     computed(py, batch, |batch| {
         batch.circular(&cone, tolerance, &mut out)
@@ -304,7 +304,7 @@ pub fn circular_quality<'py>(
 /// Q_l or Q'_l of the first grasp by the expanding polytope, and the normal of the nearest facet.
 #[pyfunction]
 pub fn weakest(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<(f64, [f64; 6])> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     let weakest = py.detach(|| {
         let contacts = contacts(batch.points, batch.normals);
         Evaluator::new(&cone).weakest(&contacts, batch.centers[0].into())
@@ -315,7 +315,7 @@ pub fn weakest(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<(f64,
 /// A proven radius of the first grasp.
 #[pyfunction]
 pub fn certified_radius(py: Python<'_>, grasps: Grasps<'_>, cone: Cone) -> PyResult<f64> {
-    let (cone, batch) = (cone.build()?, grasps.batch()?);
+    let (cone, batch) = (cone.0, grasps.batch()?);
     Ok(py.detach(|| guarantees::certified_radius(&contacts(batch.points, batch.normals), &cone)))
 }
 

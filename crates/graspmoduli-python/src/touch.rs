@@ -190,8 +190,8 @@ impl Mesh {
         request: Request,
         threads: usize,
     ) -> PyResult<Vec<FoundGrasp<'py>>> {
-        let cone = request.0.build()?;
-        let wanted = request.wanted(&cone);
+        let cone = &request.0.0;
+        let wanted = request.wanted(cone);
         let places = places_of(places.as_slice()?);
         let found = interruptible(py, |stop| {
             search::grasps(&self.0, &Tip::new(radius), &places, &wanted, threads, stop)
@@ -207,8 +207,8 @@ impl Mesh {
         places: PyReadonlyArray2<'py, f64>,
         request: Request,
     ) -> PyResult<Option<FoundGrasp<'py>>> {
-        let cone = request.0.build()?;
-        let wanted = request.wanted(&cone);
+        let cone = &request.0.0;
+        let wanted = request.wanted(cone);
         let places = places_of(places.as_slice()?);
         let limit = places.iter().map(|place| place.off).fold(0.0, f64::max);
         let found = detached(py, || {
