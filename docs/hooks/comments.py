@@ -27,7 +27,7 @@ class Comments(Extension):
             above.append(lines[number].strip()[2:].strip())
             number -= 1
         if above:
-            text = " ".join(reversed(above))
+            text = ROLE.sub(_plain, " ".join(reversed(above)))
             attr.docstring = Docstring(text, lineno=number + 2, parent=attr)
 
     def on_instance(self, *, obj: Object, **_: Any) -> None:
