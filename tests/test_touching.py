@@ -122,6 +122,23 @@ def test_fingers_that_differ_go_where_they_are_best():
         assert other <= best.quality + 1e-9
 
 
+def test_the_command_takes_a_limit_for_each_finger(tmp_path):
+    path, out = tmp_path / "bottle.ply", tmp_path / "out.json"
+    objects_made.bottle().export(path)
+    done = command("grasp", path, "--norm", "each", "--top", "1", "--json", out)
+    assert done.returncode == 0
+    assert "at most 1 each" in done.stdout
+    report = json.loads(out.read_text())
+    best = report["grasps"][0]
+    arrays = (np.array(best[name]) for name in ("contacts", "normals", "center_of_mass"))
+    q = gm.quality(*arrays, norm=report["norm"], length_scale=report["length_scale"])
+    assert report["norm"] == "each"
+    assert best["quality"] == pytest.approx(q, rel=1e-9)
+    done = command("grasp", path, "--norm", "both")
+    assert done.returncode == 2
+    assert 'norm must be "sum" or "each"' in done.stderr
+
+
 @pytest.mark.parametrize("name", ["cube", "carton"])
 def test_boxes_are_held_at_their_faces(name):
     made = objects_made.OBJECTS[name]()

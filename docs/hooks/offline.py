@@ -1,4 +1,4 @@
-"""Takes the one script that pages would load from the network out of them; docs/js does its work."""
+"""Takes the one script that pages would load from the network out; docs/js does its work."""
 
 import re
 

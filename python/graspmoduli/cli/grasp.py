@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import _arrays, _signals
+from .._batches import NORMS, is_each
 from .console import check_outputs, number, progress_bar, warnings_said, write
 from .pipeline import find_grasps, image_of
 from .report import report
@@ -40,6 +41,13 @@ def grasp(
     torsion: Annotated[
         str, typer.Option(metavar="G", help="Torsional friction of soft fingers, a length.")
     ] = "0",
+    norm: Annotated[
+        str,
+        typer.Option(
+            metavar="NORM",
+            help="sum: the normal forces of all fingers sum to at most 1; each: every one is.",
+        ),
+    ] = "sum",
     tip_radius: Annotated[
         str | None,
         typer.Option(
@@ -72,6 +80,7 @@ def grasp(
         "seed": _arrays.count("seed", number("seed", seed, int), 0),
         "contacts": _arrays.count("fingers", number("fingers", fingers, int), 1),
         "torsion": _arrays.coefficient("torsion", number("torsion", torsion, float)),
+        "norm": NORMS[is_each(norm)],
     }
     for name, text in (("tip_radius", tip_radius), ("errors", errors)):
         if text is not None:
@@ -90,7 +99,7 @@ def grasp(
             image = image_of(picture, thing, found, mu, l)
     _, fit, grasps = found
     if json_file is not None:
-        text = json.dumps(report(thing, fit, grasps, mu, l), indent=2) + "\n"
+        text = json.dumps(report(thing, fit, grasps, mu, l, options["norm"]), indent=2) + "\n"
         write(json_file, text.encode())
     if picture is not None:
         write(picture, image)

@@ -10,7 +10,9 @@ from typing import Any
 SCHEMA = 1
 
 
-def report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> dict[str, Any]:
+def report(
+    path: str, fit: Any, grasps: Any, friction: float, edges: int, norm: str
+) -> dict[str, Any]:
     """The whole file, as docs/object.md describes it."""
     return {
         "schema": SCHEMA,
@@ -25,6 +27,7 @@ def report(path: str, fit: Any, grasps: Any, friction: float, edges: int) -> dic
         },
         "friction": friction,
         "edges": edges,
+        "norm": norm,
         "length_scale": fit.length_scale,
         "center_of_mass_of": _center_of(fit),
         "note": "contacts, normals and center_of_mass are in the coordinates of the object's "

@@ -35,10 +35,11 @@ def show(path: str, fit: Any, grasps: Any, edges: int) -> None:
     if grasps:
         console.print()
         console.print(table)
+        limit = "are at most 1 each" if grasps[0].norm == "each" else "sum to 1"
         said = [
             "",
-            "Q: the largest wrench, in any direction, resisted by fingers whose normal forces sum "
-            f"to 1, with round friction cones; Q_{edges} with cones of {edges} edges; lengths "
+            "Q: the largest wrench, in any direction, resisted by fingers whose normal forces "
+            f"{limit}, with round friction cones; Q_{edges} with cones of {edges} edges; lengths "
             f"divided by {fit.length_scale:.4g}.",
             *_words(fit, grasps),
         ]
