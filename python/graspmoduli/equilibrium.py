@@ -17,8 +17,12 @@ BALANCED = 1e-11
 STEEPEST = 200
 
 
-def least_sum(columns: Floats, load: Floats) -> tuple[Floats | None, Floats]:
+def least_sum(
+    columns: Floats, load: Floats, costs: Floats | None = None
+) -> tuple[Floats | None, Floats]:
     """α ≥ 0 with Σ α_k w_k = load and the least sum, and what is left over.
+
+    The least Σ costs_k α_k if there are costs, which are not negative.
 
     The columns w_k, (r, n), must span R^r, and are best of the same size in all directions. If
     there are no such α, None and a vector x with ⟨x, load⟩ > 0 and ⟨x, w_k⟩ ≤ 0 for all k, up to
@@ -35,7 +39,8 @@ def least_sum(columns: Floats, load: Floats) -> tuple[Floats | None, Floats]:
         for _ in range(2 if pressing.size else 0):
             left = left - pressing @ np.linalg.lstsq(pressing, left, rcond=None)[0]
         return None, left
-    weights = _simplex(columns, load, _basis(columns, weights))
+    costs = np.ones(columns.shape[1]) if costs is None else costs
+    weights = _simplex(columns, load, _basis(columns, weights), costs)
     return weights, load - columns @ weights
 
 
@@ -64,14 +69,14 @@ def _basis(columns: Floats, weights: Floats) -> list[int]:
     return basis
 
 
-def _simplex(columns: Floats, load: Floats, basis: list[int]) -> Floats:
+def _simplex(columns: Floats, load: Floats, basis: list[int], costs: Floats) -> Floats:
     for step in range(50 * STEEPEST):
         square = columns[:, basis]
         values = np.linalg.solve(square, load)
         values += np.linalg.solve(square, load - square @ values)
-        prices = np.linalg.solve(square.T, np.ones(len(basis)))
+        prices = np.linalg.solve(square.T, costs[basis])
         # What a unit of each wrench costs beyond what the basis would pay for the same.
-        excess = 1.0 - prices @ columns
+        excess = costs - prices @ columns
         rounding = 1e-13 * (1.0 + np.abs(prices) @ np.abs(columns))
         gains = np.flatnonzero(excess < -rounding)
         if not gains.size:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, floats, locked
-from ._batches import Batch, GraspLike, batch
+from ._batches import Batch, GraspLike, batch, is_each
 from ._core import GraspModuliError
 from ._values import Value, hashable, same
 from .equilibrium import BALANCED, least_sum
@@ -29,11 +29,12 @@ class Resistance(Value):
     """How a grasp resists a wrench, or why it cannot."""
 
     #: Contact forces within the friction cones that balance the wrench, to 1e-11 of its size, with
-    #: the least sum of normal forces, in the object frame. Shape (m, 3). None if there are none.
+    #: the least sum of normal forces (or the least largest one, if asked for), in the object frame.
+    #: Shape (m, 3). None if there are none.
     forces: Floats | None
     #: Torques about the normals of soft fingers. Shape (m,). None if there are none.
     torques: Floats | None
-    #: The sum of the normal forces, infinite if there are none.
+    #: The sum of the normal forces (or the largest one), infinite if there are none.
     normal_force: float
     #: If there are none, the proof: a twist (v, ω) along which the wrench does work on the object
     #: and no contact force works against it, beyond rounding. (v, ω times the length scale) has
@@ -236,7 +237,7 @@ class WrenchSpace:
         # Force closure has been decided, and needs all six directions.
         return 0.0 if self.quality > 0.0 else FLAT
 
-    def resist(self, wrench: ArrayLike) -> Resistance:
+    def resist(self, wrench: ArrayLike, *, norm: str = "sum") -> Resistance:
         """Contact forces that balance a wrench on the object, or the proof that none do.
 
         Parameters
@@ -244,13 +245,16 @@ class WrenchSpace:
         wrench
             Force and torque about the centre of mass that act on the object, up to 1e150. Shape
             (6,).
+        norm
+            ``"sum"``: the forces with the least sum of normal forces. ``"each"``: those whose
+            largest normal force is least.
 
         Returns
         -------
         Resistance
-            The forces with the least sum of normal forces. Under force closure there always are
-            some, whatever the wrench.
+            The forces. Under force closure there always are some, whatever the wrench.
         """
+        each = is_each(norm)
         load = floats("wrench", wrench)
         if load.shape != (6,):
             raise GraspModuliError(f"wrench must have shape (6,), got {load.shape}")
@@ -260,7 +264,7 @@ class WrenchSpace:
             )
         target = -load / self._reach
         size = float(np.abs(target).max()) or 1.0
-        found, twist = self._least(target / size)
+        found, twist = self._least(target / size, each)
         if found is None:
             # Contacts do no positive work along the twist, the load, −target, does along minus it.
             proof = -twist / self._reach
@@ -272,11 +276,11 @@ class WrenchSpace:
         return Resistance(
             forces=locked((weights[:, :, None] * forces).sum(1)),
             torques=locked(weights @ spins),
-            normal_force=float(weights.sum()),
+            normal_force=float(weights.sum(1).max() if each else weights.sum()),
             proof=None,
         )
 
-    def _least(self, target: Floats) -> tuple[Floats | None, Floats]:
+    def _least(self, target: Floats, each: bool) -> tuple[Floats | None, Floats]:
         """Weights of the wrenches, or a twist that proves that there are none; both with torques
         over the longest lever arm."""
         scaled = self.wrenches / self._reach
@@ -291,10 +295,18 @@ class WrenchSpace:
         balancing = axes[:, :rank] / extents[:rank]
         aim = balancing.T @ target
         large = float(np.linalg.norm(aim)) or 1.0
-        found, twist = least_sum(balancing.T @ scaled.T, aim / large)
+        columns: Any = balancing.T @ scaled.T
+        load, costs = aim / large, None
+        if each:
+            # Beside the wrenches: what each finger could press more, and the most that one presses.
+            m, n = len(self.contacts), len(scaled)
+            limits = np.hstack([np.kron(np.eye(m), np.ones(n // m)), np.eye(m), -np.ones((m, 1))])
+            columns = np.vstack([np.hstack([columns, np.zeros((rank, m + 1))]), limits])
+            load, costs = np.append(load, np.zeros(m)), np.append(np.zeros(n + m), 1.0)
+        found, twist = least_sum(columns, load, costs)
         if found is None:
-            return None, balancing @ twist
-        return found * large, twist
+            return None, balancing @ twist[:rank]
+        return found[: len(scaled)] * large, twist
 
     @cached_property
     def facets(self) -> HalfSpaces:

@@ -1,0 +1,156 @@
+"""How much of a task a grasp can do: the disturbances that will come, instead of all directions.
+
+Task-oriented grasp quality goes back to Z. Li and S. S. Sastry, Task-oriented optimal grasping by
+multifingered robot hands, IEEE J. Robotics and Automation 4(1), 1988, who fit an ellipsoid of task
+wrenches into the wrenches that a grasp resists. For a task that is given by some wrenches, and so
+by their hull, the largest multiple that fits is what :func:`task_quality` computes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import Floats, count, finite, floats, number
+from ._batches import NORMS, batch
+from ._core import GraspModuliError
+from .wrench_space import WrenchSpace
+
+
+def task_quality(
+    contacts: Any,
+    normals: ArrayLike | None = None,
+    center_of_mass: ArrayLike | None = None,
+    task: ArrayLike | None = None,
+    *,
+    friction: ArrayLike | None = None,
+    edges: int | None = None,
+    torsion: float | None = None,
+    norm: str | None = None,
+) -> Any:
+    """The largest t such that t times each of the task's wrenches is resisted.
+
+    With normal forces that sum to 1 (``norm="sum"``) or are at most 1 each (``norm="each"``). By
+    linearity t times everything in the wrenches' hull is resisted, too, and a hand that presses
+    with F newtons resists t·F times the task. The answer does not depend on how torques are weighed
+    against forces, so there is no length scale. Exact to rounding: for each wrench a linear program
+    by the simplex method, about a millisecond.
+
+    Parameters
+    ----------
+    contacts, normals, center_of_mass, friction, edges, torsion, norm
+        As in :func:`graspmoduli.quality`; one grasp or many, (..., m, 3).
+    task
+        Forces and torques about the centre of mass that act on the object, as in
+        :meth:`WrenchSpace.resist`. Shape (k, 6), or (..., k, 6) with a task for each grasp.
+
+    Returns
+    -------
+    float or array of shape (...)
+        0 where some wrench cannot be resisted, however small.
+
+    Raises
+    ------
+    GraspModuliError
+        If an argument is wrong, or a wrench of the task is 0.
+
+    Examples
+    --------
+    Three fingers around a disc lift it, and turn it like a lid: with all torques about one axis, of
+    either sign.
+
+    >>> import numpy as np, graspmoduli as gm
+    >>> angle = 2 * np.pi * np.arange(3) / 3
+    >>> circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    >>> lift = [[0, 0, -1, 0, 0, 0]]
+    >>> round(gm.task_quality(circle, -circle, [0, 0, 0], lift, friction=0.5, edges=12), 9)
+    0.5
+    >>> lid = [[0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, -1]]
+    >>> hand = {"friction": 0.5, "edges": 12, "norm": "each"}
+    >>> round(gm.task_quality(circle, -circle, [0, 0, 0], lid, **hand), 9)
+    1.5
+    """
+    if task is None:
+        raise GraspModuliError("task must be given: wrenches of shape (..., k, 6), got none")
+    loads = finite("task", floats("task", task))
+    if loads.ndim < 2 or loads.shape[-1] != 6 or loads.shape[-2] == 0:
+        raise GraspModuliError(f"task must have shape (..., k, 6), k at least 1, got {loads.shape}")
+    if not loads.any(axis=-1).all():
+        raise GraspModuliError("task must hold no wrench that is 0, got one")
+    # Torques are the caller's own: what a grasp of the library divides by does not matter here.
+    grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, 1.0, norm)
+    try:
+        shape = np.broadcast_shapes(grasps.shape, loads.shape[:-2])
+    except ValueError:
+        raise GraspModuliError(
+            "task must have a batch shape that broadcasts with that of the grasps, "
+            f"got {loads.shape} and {grasps.shape}"
+        ) from None
+    points, directions, centers, frictions = grasps.arrays
+    (mu,), sides, gamma, each = grasps.cone
+    n = int(np.prod(grasps.shape, dtype=int))
+    number_of = np.broadcast_to(np.arange(n).reshape(grasps.shape), shape).ravel()
+    wrenches = np.broadcast_to(loads, (*shape, *loads.shape[-2:])).reshape(-1, *loads.shape[-2:])
+    values = np.zeros(len(wrenches))
+    space, last = None, -1
+    for row, (k, own) in enumerate(zip(number_of, wrenches, strict=True)):
+        if k != last:
+            space, last = WrenchSpace(
+                points[k], directions[k], centers[k],
+                friction=mu if frictions is None else frictions[k], edges=sides, torsion=gamma,
+            ), k  # fmt: skip
+        values[row] = _reached(space, own, NORMS[each])
+    return float(values[0]) if shape == () else values.reshape(shape)
+
+
+def _reached(space: Any, wrenches: Floats, norm: str) -> float:
+    least = np.inf
+    for wrench in wrenches:
+        size = float(np.abs(wrench).max())
+        effort = space.resist(wrench / size, norm=norm).normal_force
+        least = min(least, 0.0 if np.isinf(effort) else 1.0 / (effort * size))
+    return least
+
+
+def gravity(mass: float, direction: ArrayLike | None = None, *, directions: int = 64) -> Floats:
+    """The weight of an object as a task: its wrench about the centre of mass, in newtons.
+
+    Parameters
+    ----------
+    mass
+        In kilograms.
+    direction
+        Where down is, (3,), of any length; if not given, nobody knows: directions all around.
+    directions
+        How many of them, spread evenly over the sphere.
+
+    Returns
+    -------
+    array of shape (k, 6)
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> gm.gravity(0.5, [0, 0, -1]).round(3).tolist()
+    [[0.0, 0.0, -4.903, 0.0, 0.0, 0.0]]
+    >>> gm.gravity(0.5).shape
+    (64, 6)
+    """
+    weight = 9.80665 * number("mass", mass, positive=True)
+    if direction is None:
+        k = np.arange(count("directions", directions, 4, 100_000))
+        # Fibonacci's lattice: equal heights, golden angles.
+        height = 1.0 - (2.0 * k + 1.0) / len(k)
+        turn = np.pi * (3.0 - np.sqrt(5.0)) * k
+        flat = np.sqrt(1.0 - height * height)
+        down = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    else:
+        down = finite("direction", floats("direction", direction))[None]
+        if down.shape != (1, 3) or not down.any():
+            raise GraspModuliError(
+                f"direction must have shape (3,) and not be 0, got {np.asarray(direction).shape}"
+            )
+        down = down / np.linalg.norm(down)
+    return np.concatenate([weight * down, np.zeros_like(down)], axis=1)
