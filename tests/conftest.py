@@ -36,12 +36,14 @@ def uniform():
     return uniform_grasps(200_000, np.random.default_rng(20130624))
 
 
-def quick(values, names):
+def some_long(values, is_long):
+    """Parameters of a test, of which some run with the longer tests only."""
+    return [pytest.param(v, marks=pytest.mark.long if is_long(v) else []) for v in values]
+
+
+def quick(values, *names):
     """Parameters of a test, of which only those that are named run with the quick tests."""
-    marks = [
-        [] if str(getattr(value, "stem", value)) in names else pytest.mark.long for value in values
-    ]
-    return [pytest.param(value, marks=mark) for value, mark in zip(values, marks, strict=True)]
+    return some_long(values, lambda value: getattr(value, "stem", value) not in names)
 
 
 def objects():

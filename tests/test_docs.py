@@ -6,17 +6,12 @@ import sys
 
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, some_long
 
 
-def long_if(names):
-    """Paths as parameters; those with one of the names in them take longer."""
-
-    def mark(path):
-        marks = [pytest.mark.long] if any(name in str(path) for name in names) else []
-        return pytest.param(path, marks=marks)
-
-    return lambda paths: [mark(path) for path in paths]
+def named(*names):
+    """Has a path one of these in it?"""
+    return lambda path: any(name in str(path) for name in names)
 
 
 def run_blocks(path):
@@ -29,8 +24,12 @@ def run_blocks(path):
 @pytest.mark.parametrize(
     "path",
     # That of torch runs where torch is: in tests/extras.
-    long_if(["paper.md", "cluster.md", "transfer.md", "object.md"])(
-        [ROOT / "README.md", *sorted({*(ROOT / "docs").glob("*.md")} - {ROOT / "docs/gradient.md"})]
+    some_long(
+        [
+            ROOT / "README.md",
+            *sorted({*(ROOT / "docs").glob("*.md")} - {ROOT / "docs/gradient.md"}),
+        ],
+        named("paper.md", "cluster.md", "transfer.md", "object.md"),
     ),
     ids=lambda p: p.name,
 )
@@ -49,8 +48,9 @@ def test_linked_files_exist():
 
 @pytest.mark.parametrize(
     "path",
-    long_if(["examples/paper", "02_own", "03_family", "04_transfer"])(
-        sorted((ROOT / "examples").rglob("*.py"))
+    some_long(
+        sorted((ROOT / "examples").rglob("*.py")),
+        named("examples/paper", "02_own", "03_family", "04_transfer"),
     ),
     ids=lambda p: p.stem,
 )

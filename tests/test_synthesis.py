@@ -217,7 +217,7 @@ class TestSynthesis:
 
     @pytest.mark.parametrize(
         "path",
-        quick(sorted(OBJECTS.glob("*.ply")), ["coffee_mug", "yogurt_bottle"]),
+        quick(sorted(OBJECTS.glob("*.ply")), "coffee_mug", "yogurt_bottle"),
         ids=lambda path: path.stem,
     )
     def test_nor_do_the_last_bits_of_a_fit(self, path):
@@ -314,6 +314,11 @@ class TestSoftFingers:
         end = gm.transfer(vase, found[0].grasp, 2.0 * vase, norm="each", surfaces=2)
         assert end.norm == "each"
         assert gm.quality(end) == end.quality == end.path[-1]
+        moved = gm.transfer(vase, found[0].grasp, 2.0 * vase, "gradient", norm="each", surfaces=10)
+        assert moved.quality > end.quality
+        crowd = gm.Grasp(np.linspace(0.1, 0.9, 123), np.arange(123.0))
+        with pytest.raises(gm.GraspModuliError, match="at most 122"):
+            gm.transfer(vase, crowd, vase, "gradient", norm="each")
 
     def test_two_soft_fingers_are_carried_by_what_they_can_do(self):
         can = gm.Surface.revolution(lambda u: 0.4 + 0.0 * u, -0.3, 0.3)

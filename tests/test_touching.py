@@ -55,34 +55,34 @@ def check(vertices, faces, name, **options: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize(
-    "path", quick(objects(), ["coffee_mug", "spray_bottle"]), ids=lambda path: path.stem
+    "path", quick(objects(), "coffee_mug", "spray_bottle"), ids=lambda path: path.stem
 )
 def test_every_grasp_of_a_real_mesh_is_true(path):
     assert len(check(*read(path), path.stem)) == 5
 
 
-@pytest.mark.parametrize("name", quick(objects_made.OBJECTS, ["mug", "fork", "drill", "torus"]))
+@pytest.mark.parametrize("name", quick(objects_made.OBJECTS, "mug", "fork", "drill", "torus"))
 def test_every_grasp_of_a_made_object_is_true(name):
     made = objects_made.OBJECTS[name]()
     check(made.vertices, made.faces, name)
 
 
-@pytest.mark.parametrize("seed", quick([1, 2], "1"))
+@pytest.mark.parametrize("seed", quick([1, 2], 1))
 @pytest.mark.parametrize(
-    "name", quick(["mug", "drill", "banana", "scissors", "tray", "hook"], ["mug", "scissors"])
+    "name", quick(["mug", "drill", "banana", "scissors", "tray", "hook"], "mug", "scissors")
 )
 def test_pose_unit_winding_and_seed_do_not_matter(name, seed):
     moved = objects_made.moved(objects_made.OBJECTS[name](), seed)
     check(moved.vertices, moved.faces, name, seed=seed)
 
 
-@pytest.mark.parametrize("name", quick(["mug", "toy_car", "carton"], ["mug"]))
+@pytest.mark.parametrize("name", quick(["mug", "toy_car", "carton"], "mug"))
 def test_slippery_fingers(name):
     made = objects_made.OBJECTS[name]()
     check(made.vertices, made.faces, name, friction=0.5)
 
 
-@pytest.mark.parametrize("fingers", quick([4, 5], ""))
+@pytest.mark.parametrize("fingers", quick([4, 5]))
 def test_more_fingers_hold_better(fingers):
     made = objects_made.bottle()
     best = check(made.vertices, made.faces, "bottle", contacts=fingers, top=2)[0]
@@ -128,6 +128,7 @@ def test_the_command_takes_a_limit_for_each_finger(tmp_path):
     done = command("grasp", path, "--norm", "each", "--top", "1", "--json", out)
     assert done.returncode == 0
     assert "at most 1 each" in done.stdout
+    assert "Q'_8" in done.stdout
     report = json.loads(out.read_text())
     best = report["grasps"][0]
     arrays = (np.array(best[name]) for name in ("contacts", "normals", "center_of_mass"))

@@ -187,6 +187,19 @@ def frictions_of(friction: ArrayLike | None, m: int, *, positive: bool = False) 
 NORMS = ("sum", "each")
 
 
+#: Most contacts for which there is a gradient where every finger has a limit of its own.
+MOST_EACH = _core.MOST_EACH
+
+
+def check_gradient(cone: Cone, m: int) -> None:
+    """Refuses more contacts than there is a gradient for."""
+    if cone[3] and m > MOST_EACH:
+        raise GraspModuliError(
+            f'contacts must be at most {MOST_EACH} per grasp for the gradient with norm "each", '
+            f"got {m}"
+        )
+
+
 def is_each(norm: Any) -> bool:
     """Has every finger a limit of its own? Not unless the caller or the grasp says so."""
     if norm is not None and (not isinstance(norm, str) or norm not in NORMS):

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 _Floats = NDArray[np.float64]
 
+MOST_EACH: int
+
 class GraspModuliError(ValueError):
     """Wrong input: names the argument, what was wanted and what came."""
 

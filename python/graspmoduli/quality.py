@@ -15,12 +15,9 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, locked, number
-from ._batches import Batch, GraspLike, batch
+from ._batches import Batch, GraspLike, batch, check_gradient
 from ._core import GraspModuliError
 from ._values import Value
-
-#: Most contacts for which there is a gradient where every finger has a limit of its own.
-MOST_EACH = 16
 
 
 @overload
@@ -181,7 +178,7 @@ def quality_gradient(
     generalised gradient, the convex hull of the limits of gradients nearby. Where Q = 0 all
     derivatives are 0, which is the gradient inside of the set {Q = 0} and an element of the
     generalised one on its boundary. Where a normal is −e₃ the contact frame is not continuous, and
-    the motion of its tangents is left out. With ``norm="each"``, for up to 16 contacts, the foot
+    the motion of its tangents is left out. With ``norm="each"``, for up to 122 contacts, the foot
     point is a sum over the fingers, Σ_j α_ij = 1 for each finger i that presses.
 
     Examples
@@ -195,11 +192,7 @@ def quality_gradient(
     """
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
     m, shape = grasps.arrays[0].shape[1], grasps.shape
-    if grasps.cone[3] and m > MOST_EACH:
-        raise GraspModuliError(
-            f'contacts must be at most {MOST_EACH} per grasp for the gradient with norm "each", '
-            f"got {m}"
-        )
+    check_gradient(grasps.cone, m)
     rows = _core.quality_gradient(grasps.arrays, grasps.cone)
     found, by_contact, by_normal, by_center = np.split(rows, [1, 1 + 3 * m, 1 + 6 * m], axis=1)
     # The kernel's derivatives are by lengths over the length scale.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import Floats, brief, cells, count, locked, number
-from ._batches import NORMS, Cone, carried, fingers
+from ._batches import NORMS, Cone, carried, check_gradient, fingers
 from ._core import GraspModuliError, cos, sin
 from ._values import Value
 from .grasps import Grasp, RankedGrasp, a_grasp, a_point, a_surface, place
@@ -203,6 +203,8 @@ def transfer(
             'method "ascent" is for hard fingers whose forces add up, '
             f'got torsion {hand[2]:g} and norm "{NORMS[hand[3]]}"'
         )
+    if method == "gradient":
+        check_gradient(hand, m)
     region = cells(allowed)
     if region is not None and method != "ascent":
         raise GraspModuliError(f'allowed is for method "ascent", got method {method!r}')

@@ -67,8 +67,9 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_init]
-    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         super::pool::remember_process();
+        module.add("MOST_EACH", graspmoduli::quality::MOST_EACH)?;
         Ok(())
     }
 

@@ -10,8 +10,7 @@ pub(crate) use serial::*;
 /// parallel runs on the threads of its caller. The results do not depend on their number.
 ///
 /// ```
-/// use graspmoduli::glam::DVec3;
-/// use graspmoduli::{Contact, FrictionCone, Batch, on_threads};
+/// use graspmoduli::{Batch, FrictionCone, on_threads};
 ///
 /// let (points, normals) = ([[1.0, 0.0, 0.0]; 3000], [[-1.0, 0.0, 0.0]; 3000]);
 /// let batch = Batch { points: &points, normals: &normals, centers: &[[0.0; 3]; 1000], ..Batch::default() };
@@ -19,7 +18,6 @@ pub(crate) use serial::*;
 /// let mut quality = [1.0; 1000];
 /// on_threads(2, || batch.quality(&cone, &mut quality))?;
 /// assert_eq!(quality, [0.0; 1000]); // all fingers at one place hold nothing
-/// # let _ = Contact::new(DVec3::X, DVec3::Z)?;
 /// # Ok::<(), graspmoduli::Error>(())
 /// ```
 #[cfg(feature = "rayon")]

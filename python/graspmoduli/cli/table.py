@@ -36,10 +36,11 @@ def show(path: str, fit: Any, grasps: Any, edges: int) -> None:
         console.print()
         console.print(table)
         limit = "are at most 1 each" if grasps[0].norm == "each" else "sum to 1"
+        name = _name(grasps, edges)
         said = [
             "",
             "Q: the largest wrench, in any direction, resisted by fingers whose normal forces "
-            f"{limit}, with round friction cones; Q_{edges} with cones of {edges} edges; lengths "
+            f"{limit}, with round friction cones; {name} with cones of {edges} edges; lengths "
             f"divided by {fit.length_scale:.4g}.",
             *_words(fit, grasps),
         ]
@@ -75,7 +76,7 @@ def _words(fit: Any, grasps: Any) -> list[str]:
 def table_of(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
     """Grasps by rank: fingers side by side, or one below the other where it is narrow."""
     table = Table(box=None, padding=(0, 1 if stacked else 2), header_style="bold")
-    columns = ["#", "Q", f"Q_{edges}"]
+    columns = ["#", "Q", _name(grasps, edges)]
     if stacked:
         columns += ["finger", "(x, y, z)"]
     else:
@@ -95,6 +96,11 @@ def table_of(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
         else:
             table.add_row(*head, *points)
     return table
+
+
+def _name(grasps: Any, edges: int) -> str:
+    """Q_l, or Q'_l of fingers with a limit each."""
+    return f"Q'_{edges}" if grasps and grasps[0].norm == "each" else f"Q_{edges}"
 
 
 def _rounded(x: float, digits: int) -> float:

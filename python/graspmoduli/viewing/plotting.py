@@ -105,7 +105,10 @@ def plot_grasps(
                 labels=False,
             )
             axes.set_title(f"{column + 2}   Q = {grasp.quality:.3f}", fontsize=10, y=-0.12)
-    best = f"best grasp: $Q_{{{edges}}}$ = {grasps[0].quality:.4f}" if grasps else "no grasp found"
+    best = "no grasp found"
+    if grasps:
+        prime = "'" if grasps[0].norm == "each" else ""
+        best = f"best grasp: $Q{prime}_{{{edges}}}$ = {grasps[0].quality:.4f}"
     figure.suptitle(f"{title}    {best}    (μ = {friction:g})".strip(), fontsize=13, y=0.965)
     handles = [
         Line2D([], [], marker="o", linestyle="", color=color, label=f"finger {i + 1}")

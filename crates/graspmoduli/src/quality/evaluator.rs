@@ -164,7 +164,8 @@ impl Evaluator {
 
     /// Q_l with its exact gradient. Where several facets of the hull are nearest to the origin, Q
     /// is not differentiable, and the gradient is that of the distance to one of them, with
-    /// multipliers that are not negative: an element of Clarke's generalised gradient.
+    /// multipliers that are not negative: an element of Clarke's generalised gradient. Fingers with a
+    /// limit each may be [`MOST_EACH`](super::MOST_EACH); of more the derivatives are left at 0.
     pub fn gradient(&mut self, contacts: &[Contact], center_of_mass: DVec3) -> Gradient {
         let mut row = vec![0.0; Gradient::width(contacts.len())];
         self.gradient_row(contacts, center_of_mass, &mut row);

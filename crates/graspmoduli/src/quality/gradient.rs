@@ -138,7 +138,13 @@ pub(super) fn foot_point(
     let foot = reference.of_wrench(direction.map(|x| x * value), center);
     let found = match wrenches.norm {
         Norm::Sum => of_one_hull(wrenches, &twist, value, foot),
-        Norm::Each => of_a_sum_of_hulls(wrenches, &twist, value, foot),
+        // Least squares in as many rows as are needed, about.
+        Norm::Each => match shares.len() {
+            0..=10 => of_a_sum_of_hulls::<16>(wrenches, &twist, value, foot),
+            11..=26 => of_a_sum_of_hulls::<32>(wrenches, &twist, value, foot),
+            27..=MOST_EACH => of_a_sum_of_hulls::<128>(wrenches, &twist, value, foot),
+            _ => None,
+        },
     };
     let Some((active, weights)) = found else {
         return false;
@@ -173,12 +179,12 @@ fn of_one_hull(wrenches: &Wrenches, twist: &Twist, value: f64, foot: Twist) -> O
 }
 
 /// Most contacts with a limit each whose gradient is found.
-const MOST_EACH: usize = 16;
-const ROWS: usize = 6 + MOST_EACH;
+pub const MOST_EACH: usize = 122;
 
 /// The foot point as a sum over the contacts: of a convex combination of those wrenches of each
-/// that go farthest along the twist and, where these do not help, of less than that.
-fn of_a_sum_of_hulls(
+/// that go farthest along the twist and, where these do not help, of less than that. A row for each
+/// component of the foot point, then one for each contact.
+fn of_a_sum_of_hulls<const ROWS: usize>(
     wrenches: &Wrenches,
     twist: &Twist,
     value: f64,

@@ -24,7 +24,7 @@ mod wrenches;
 
 pub use batch::Batch;
 pub use evaluator::{Evaluator, Weakest};
-pub use gradient::Gradient;
+pub use gradient::{Gradient, MOST_EACH};
 pub use instructions::instructions_name;
 pub(crate) use polytope::LARGEST_ERROR;
 pub use r6::Twist;
