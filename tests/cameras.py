@@ -78,7 +78,16 @@ def rasterised(vertices, faces, focal, center, pixels):
 
 
 def seen(
-    mesh, view, rng, up=(0, 0, 1), *, noise=0.003, flying=0.0, dropouts=0.2, table=False, pixels=PIXELS
+    mesh,
+    view,
+    rng,
+    up=(0, 0, 1),
+    *,
+    noise=0.003,
+    flying=0.0,
+    dropouts=0.2,
+    table=False,
+    pixels=PIXELS,
 ) -> View:
     """A mesh as a camera sees it that looks at its middle, three sizes away.
 
@@ -99,7 +108,9 @@ def seen(
         side /= np.linalg.norm(side)
         other = np.cross(up, side)
         foot = middle + up * ((vertices - middle) @ up).min()
-        square = [foot + size * (a * side + b * other) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        square = [
+            foot + size * (a * side + b * other) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
         board = (np.array(square) - pose[:3, 3]) @ pose[:3, :3]
         behind = rasterised(board, [[0, 1, 2], [0, 2, 3]], focal, center, pixels)
         of_table = behind < depth
@@ -113,5 +124,7 @@ def seen(
         read = np.where(wrong, depth + size * rng.uniform(-0.5, 0.5, depth.shape), read)
     read = np.where(rng.random(depth.shape) < dropouts, np.nan, read)
     row, column = np.mgrid[:pixels, :pixels]
-    rays = np.stack([(column - center) / focal, (row - center) / focal, np.ones_like(depth)], axis=-1)
+    rays = np.stack(
+        [(column - center) / focal, (row - center) / focal, np.ones_like(depth)], axis=-1
+    )
     return View(rays * read[..., None], pose, depth, focal, center, of_table)

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from .._arrays import Floats
 from .._core import cos, sin, solve_banded
 from .reading import Object
-from .walls import CLOSE, Axis, coarse_hits, outermost, regress
+from .views import is_free
+from .walls import CLOSE, Axis, Grid, coarse_hits, outermost, regress
 
+#: Weight of the share of a surface that is where a camera saw nothing to be.
+INTO_VOID = 4.0
 #: Numbers of order 1 this close are equal but for rounding.
 TIE = 1e-9
 
@@ -212,4 +215,17 @@ def score(thing: Object, axis: Axis) -> float:
     # the true axis, fewer about many others.
     mesh = thing.faces is not None
     unseen = 2.5 * (1.0 - seen) if mesh else 0.4 * max(0.0, 0.6 - seen)
-    return misfit + oval + 0.1 * pinched + 2.0 * missed + unseen
+    void = INTO_VOID * _in_void(thing, axis, grid, rings)
+    return misfit + oval + 0.1 * pinched + 2.0 * missed + unseen + void
+
+
+def _in_void(thing: Object, axis: Axis, grid: Grid, rings: Floats) -> float:
+    """Share of a surface's points where a camera saw that there is nothing."""
+    if not thing.views:
+        return 0.0
+    rows, columns = rings.shape
+    height = grid.low + (np.arange(rows) + 0.5) / rows * (grid.high - grid.low)
+    angle = np.arange(columns) * 2 * np.pi / columns
+    around = np.stack([cos(angle), sin(angle), np.zeros(columns)], axis=1)
+    local = rings[:, :, None] * around + height[:, None, None] * np.array([0.0, 0.0, 1.0])
+    return float(is_free(thing.views, axis.origin + local @ axis.rotation.T, thing.size).mean())

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._arrays import (
     Floats,
@@ -26,9 +27,8 @@ from .fits import Fit as Fit
 from .fits import Residual as Residual
 from .object_grasps import ObjectGrasp as ObjectGrasp
 from .reading import Object, read
-from .touching import (
-    TriangleMesh,
-)
+from .touching import TIP, TriangleMesh
+from .views import is_free
 from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
 
 #: More unexplained than this is refused, of a cloud of points.
@@ -42,16 +42,32 @@ WORTH_A_WARNING_OF_MESH, LEAST_COVERAGE = 0.05, 0.9
 
 
 def fit(
-    points_or_mesh_or_path: Any, *, progress: Callable[[int, int], object] | None = None
+    points_or_mesh_or_path: Any,
+    *,
+    camera: ArrayLike | None = None,
+    object_number: int | None = None,
+    keep_table: bool = False,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Fit:
     """The surface with cylindrical coordinates that is closest to a real object.
 
     Parameters
     ----------
     points_or_mesh_or_path
-        Points of shape (n, 3), a trimesh mesh, a pair (vertices, faces), or the path of a PLY,
-        OBJ, STL, GLB, OFF, PCD, XYZ or NPY file. Any unit, any pose; a scan may be noisy and see
-        the object from one side only.
+        Points of shape (n, 3), or an image of points (rows, columns, 3), NaN where nothing came
+        back; a trimesh mesh; a pair (vertices, faces); the path of a PLY, OBJ, STL, GLB, OFF, PCD,
+        XYZ or NPY file, or of a TOML file that lists depth images with their intrinsics; or a list
+        of clouds in the same coordinates. Any unit, any pose; a scan may be noisy and see the
+        object from one side only.
+    camera
+        Where the camera was that saw a cloud, shape (3,), in its coordinates; one per cloud, shape
+        (k, 3), of several. Of images of points it is found, and of depth images known. What it saw
+        to be empty is no place for the surface, nor for contacts.
+    object_number
+        Which of several objects, counted from 1 by size.
+    keep_table
+        A plane around which nothing stands and on which something stands, is a table: it is left
+        out of scans and closed to fingers, unless this is true.
     progress
         Called as ``progress(done, total)`` after each axis tried.
 
@@ -65,9 +81,11 @@ def fit(
     ------
     GraspModuliError
         If the file cannot be read, holds several objects (parts farther apart than 3 % of the size
-        in a mesh, 8 % in a cloud of points), or the object is no such surface.
+        in a mesh, 8 % in a cloud of points where the space between was seen) and no number of one
+        is given, or the object is no such surface.
     """
-    return _fitted(read(points_or_mesh_or_path), progress, stacklevel=3)
+    thing = read(points_or_mesh_or_path, camera, object_number, keep_table=keep_table)
+    return _fitted(thing, progress, stacklevel=3)
 
 
 def fit_object(thing: Object, progress: Callable[[int, int], object] | None = None) -> Fit:
@@ -153,6 +171,7 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     if mesh:
         # Where no ray hits a mesh there is nothing to touch.
         allowed &= seen.reshape(grid.rows, grid.columns)
+    allowed &= ~_closed(thing, surface, pose, allowed.shape)
     rim = max(1, round(0.03 * grid.rows))
     allowed[:rim] = allowed[-rim:] = False
 
@@ -169,6 +188,26 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
         allowed=allowed,
         mesh=body,
     )
+
+
+def _closed(thing: Object, surface: Surface, pose: Floats, shape: tuple[int, ...]) -> Booleans:
+    """Cells of the surface where a camera saw nothing to be, or where the table is in the way."""
+    rows, columns = shape
+    u, theta = np.meshgrid(
+        (np.arange(rows) + 0.5) / rows,
+        (np.arange(columns) + 0.5) * 2 * np.pi / columns,
+        indexing="ij",
+    )
+    points = surface.points(u, theta) @ pose[:3, :3].T + pose[:3, 3]
+    closed = is_free(thing.views, points, thing.size)
+    if thing.table is not None:
+        normals = surface.normals(u, theta) @ pose[:3, :3].T
+        # Neither the tip nor a finger as long as the object may reach into it.
+        low = np.minimum(
+            thing.table.height(points), thing.table.height(points - thing.size * normals)
+        )
+        closed |= low < TIP * thing.size
+    return closed
 
 
 def _pose(axis: Axis, middle: float) -> Floats:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import os
-import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Floats, finite, numbers
+from .._arrays import Floats, count, finite, numbers
 from .._core import GraspModuliError
-
-#: File name endings that can be read.
-FORMATS = (".ply", ".obj", ".stl", ".glb", ".gltf", ".off", ".pcd", ".xyz", ".txt", ".npy")
+from .captures import Capture, cameras, from_toml, merged, of_points
+from .files import from_file
+from .scans import Plane, cleaned, described, parts_of
+from .views import View
 
 #: Fewest points of a cloud from which an axis and a surface can be estimated.
 FEWEST_POINTS = 50
-#: Parts farther apart than this, relative to the size, are objects of their own: of a mesh, and of
-#: points, in which a gap may be what a camera did not see.
-GAP_IN_MESH, GAP_IN_CLOUD = 0.03, 0.08
+#: Parts of a mesh farther apart than this, relative to the size, are objects of their own.
+GAP_IN_MESH = 0.03
 #: A part that holds less than this share of the points or area is noise, not an object.
 SMALLEST_PART = 0.05
 #: Noise of more than this share is worth a warning.
@@ -35,14 +33,10 @@ MOST_AREA = 4.0
 #: Points whose neighbourhoods are this thick, relative to all of them, are a plane with noise, or,
 #: if they are 20 times longer than wide, a line.
 THICK_PLANE, THICK_LINE = 0.65, 0.35
-#: A face of an OBJ file with a vertex 0: the first number of a corner such as 3/1/2.
-VERTEX_0 = re.compile(rb"^[ \t]*f[ \t](?:[^\r\n]*[ \t])?[+-]?0+(?![^/\s])", re.MULTILINE)
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
-#: The level of who calls what is public and calls :func:`read`, from where warnings are given.
-TO_CALLER = 5
-#: Points of a cloud that are used; more add nothing but time.
-MOST_POINTS = 30_000
+#: Points of a scan that are looked at, and of its object that are used; more add nothing but time.
+MOST_OF_SCAN, MOST_POINTS = 100_000, 30_000
 
 
 @dataclass(frozen=True)
@@ -59,12 +53,59 @@ class Object:
     sample_normals: Floats
     #: Largest extent along the principal axes.
     size: float
+    #: From where a scan was seen, where that is known.
+    views: tuple[View, ...] = ()
+    #: On what the object of a scan stands.
+    table: Plane | None = None
 
 
-def read(source: Any) -> Object:
-    """The object in a file, array of points (n, 3), trimesh mesh or pair (vertices, faces)."""
+def read(
+    source: Any,
+    camera: Any = None,
+    object_number: int | None = None,
+    *,
+    keep_table: bool = False,
+) -> Object:
+    """The object in a file, array of points, trimesh mesh or pair (vertices, faces).
+
+    A list of files or arrays is several scans of one object. The other arguments are those of
+    :func:`graspmoduli.fit`.
+    """
+    notes: list[str] = []
+    chosen = None if object_number is None else count("object_number", object_number, 1)
+    found = _held(source, camera)
+    if isinstance(found, Capture):
+        thing = _of_cloud(found, chosen, notes, keep_table=keep_table)
+    elif camera is not None:
+        raise GraspModuliError("camera must be left out for a mesh: nothing of it is unseen")
+    else:
+        thing = _of_mesh(*found, chosen, notes)
+    for note in notes:
+        # For who calls what is public and calls this.
+        warnings.warn(note, stacklevel=3)
+    return thing
+
+
+def _held(source: Any, camera: Any) -> Capture | tuple[Any, Any]:
+    """Points as cameras saw them, or vertices and faces."""
+    if _is_several(source):
+        ats = cameras(camera, len(source))
+        several = [_held(one, at) for one, at in zip(source, ats, strict=True)]
+        captures = [one for one in several if isinstance(one, Capture)]
+        if len(captures) < len(several):
+            raise GraspModuliError(
+                "object must be clouds of points where it is several, got a mesh"
+            )
+        return merged(captures)
+    at = camera
     if isinstance(source, (str, os.PathLike)):
-        points, faces = _from_file(Path(source))
+        path = Path(source)
+        if path.suffix.lower() == ".toml":
+            if camera is not None:
+                raise GraspModuliError("camera must stand in the TOML file, got one beside it")
+            return from_toml(path)
+        points, faces, known = from_file(path)
+        at = known if camera is None else camera
     elif hasattr(source, "vertices") and hasattr(source, "faces"):
         points, faces = source.vertices, source.faces
     elif hasattr(source, "vertices"):
@@ -73,248 +114,102 @@ def read(source: Any) -> Object:
         points, faces = source
     else:
         points, faces = source, None
-    return _checked(points, faces)
+    if faces is not None:
+        return points, faces
+    return of_points(numbers("object", points), cameras(at, 1)[0])
 
 
-def _from_file(path: Path) -> tuple[Any, Any]:
-    kind = path.suffix.lower()
-    try:
-        folder, exists = path.is_dir(), path.exists()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise GraspModuliError(
-            f"object must be a file that exists, got {path} ({reason})"
-        ) from None
-    if folder:
-        raise GraspModuliError(f"object must be a file, got the folder {path}")
-    if not exists:
-        raise GraspModuliError(f"object must be a file that exists, got {path}")
-    if kind not in FORMATS:
-        raise GraspModuliError(
-            f"object must be a file of a known format ({' '.join(FORMATS)}), got {path.name}"
+def _is_several(source: Any) -> bool:
+    """Is this a list of files or arrays, not one of coordinates?"""
+    return (
+        isinstance(source, list)
+        and len(source) > 0
+        and all(isinstance(one, (str, os.PathLike)) or np.ndim(one) >= 2 for one in source)
+        and not (np.ndim(source[0]) == 2 and isinstance(source[0], list))
+    )
+
+
+def _of_cloud(
+    capture: Capture, number: int | None, notes: list[str], *, keep_table: bool
+) -> Object:
+    points, views, total = capture
+    if len(points) < total:
+        notes.append(
+            f"{total - len(points):,} of {total:,} points are NaN, missing pixels, and left out"
         )
-    if path.stat().st_size == 0:
-        raise GraspModuliError(f"object must not be empty, got the empty file {path}")
-    try:
-        if kind == ".npy":
-            return np.load(path, allow_pickle=False), None
-        if kind in (".xyz", ".txt"):
-            return np.loadtxt(path, ndmin=2, comments=("#", "//"))[:, :3], None
-        if kind == ".pcd":
-            from pypcd4.pypcd4 import PointCloud
-
-            _check_pcd(path)
-            return PointCloud.from_path(path).numpy(("x", "y", "z")), None
-        return _from_mesh_file(path)
-    except GraspModuliError:
-        raise
-    except PermissionError:
-        raise GraspModuliError(f"object must be a file that can be read, got {path}") from None
-    except Exception as error:
-        # Readers raise whatever their parsing ran into.
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise GraspModuliError(
-            f"object must be a whole {kind[1:].upper()} file, got {path} ({reason[:120]})"
-        ) from None
-
-
-def _from_mesh_file(path: Path) -> tuple[Any, Any]:
-    import trimesh
-    from trimesh.resolvers import FilePathResolver
-
-    promised = _promised_vertices(path)
-    _check_text(path)
-    # As it is: vertices are neither merged nor, if not finite, dropped.
-    log = logging.getLogger("trimesh")
-    level = log.level
-    # What it cannot make sense of it would tell with a traceback.
-    log.setLevel(logging.CRITICAL)
-    try:
-        # It names parts after the file, and wants UTF-8 of that.
-        resolver = FilePathResolver(str(path))
-        resolver.file_name = "object"
-        with path.open("rb") as file:
-            scene = trimesh.load_scene(file, path.suffix[1:].lower(), resolver, process=False)
-    finally:
-        log.setLevel(level)
-    meshes: list[Any] = []
-    clouds: list[Any] = []
-    for geometry in scene.dump():
-        (meshes if isinstance(geometry, trimesh.Trimesh) else clouds).append(geometry)
-    if meshes:
-        mesh: Any = trimesh.util.concatenate(meshes)
-        points, faces = mesh.vertices, mesh.faces
-    elif clouds:
-        points, faces = np.concatenate([np.asarray(c.vertices) for c in clouds]), None
-    else:
-        raise GraspModuliError(f"object must hold a mesh or points, got none in {path}")
-    if promised is not None and len(points) == 0 < promised:
-        raise GraspModuliError(f"object must be a whole file, got {path} without its points")
-    return points, faces if faces is not None and len(faces) else None
-
-
-def _promised_vertices(path: Path) -> int | None:
-    """How many vertices a PLY header announces; a truncated ASCII body is found out by it."""
-    if path.suffix.lower() != ".ply":
-        return None
-    announced: dict[str, int] = {}
-    ascii_body = False
-    with path.open("rb") as file:
-        if file.readline().strip() != b"ply":
-            raise GraspModuliError(f"object must be a whole PLY file, got {path} without a header")
-        for line in file:
-            words = line.split()
-            if words[:1] == [b"format"]:
-                ascii_body = words[1] == b"ascii"
-            if words[:1] == [b"element"]:
-                announced[words[1].decode()] = int(words[2])
-            if words == [b"end_header"]:
-                break
-        else:
-            raise GraspModuliError(f"object must be a whole PLY file, got {path} cut in its header")
-        if ascii_body:
-            wanted, found = sum(announced.values()), sum(1 for line in file if line.strip())
-            if found < wanted:
-                raise GraspModuliError(
-                    f"object must be a whole PLY file, got {path} "
-                    f"with {found} of {wanted} announced rows"
-                )
-    return announced.get("vertex")
-
-
-def _check_text(path: Path) -> None:
-    """Refuses OFF, OBJ and ASCII STL files with zeroed blocks or fewer rows than announced.
-
-    And OBJ faces that count vertices from 0.
-    """
-    kind = path.suffix.lower()
-    if kind not in (".off", ".obj", ".stl"):
-        return
-    with path.open("rb") as file:
-        head = file.read(512)
-        if kind == ".stl" and not (head.lstrip().startswith(b"solid") and b"facet" in head):
-            return
-        text = head + file.read()
-    name = kind[1:].upper()
-    if b"\0" in text:
-        raise GraspModuliError(f"object must be a whole {name} file, got {path} with zeroed bytes")
-    if kind == ".obj" and (found := VERTEX_0.search(text)):
-        row = text[: found.start()].count(b"\n") + 1
-        raise GraspModuliError(
-            f"object must have faces that count vertices from 1, as OBJ files do, got {path} with "
-            f"vertex 0 in row {row}"
+    _check_count(points)
+    _check_extent(points)
+    _check_solid(points)
+    found = cleaned(_some(points, MOST_OF_SCAN), views, number, keep_table=keep_table)
+    if found.flying > MUCH_NOISE:
+        notes.append(f"{found.flying:.1%} of the points are flying pixels, and left out")
+    if found.table is not None:
+        notes.append(
+            f"a table was found, {found.of_table:.0%} of the points, and left out; contacts keep "
+            "clear of it"
         )
-    if kind == ".stl" and b"endsolid" not in text:
-        raise GraspModuliError(f"object must be a whole STL file, got {path} without its end")
-    if kind == ".stl" and text.count(b"vertex ") != 3 * text.count(b"endfacet"):
-        raise GraspModuliError(
-            f"object must be a whole STL file, got {path} with {text.count(b'vertex ')} vertices "
-            f"for {text.count(b'endfacet')} facets"
+    if found.parts > 1:
+        notes.append(
+            f"the object's points are in {found.parts} parts with a narrow or an unseen space "
+            "between them; they are taken for one object"
         )
-    if kind != ".off":
-        return
-    lines = [line.split(b"#")[0].split() for line in text.splitlines()]
-    rows = [line for line in lines if line]
-    if rows and rows[0][0].upper().endswith(b"OFF"):
-        # The counts may stand in the first row.
-        rows[0] = rows[0][1:]
-        rows = rows if rows[0] else rows[1:]
-    wanted = int(rows[0][0]) + int(rows[0][1])
-    if len(rows) - 1 < wanted:
+    if found.apart > MUCH_NOISE:
+        notes.append(f"{found.apart:.1%} of the object lies apart from the rest and is left out")
+    _check_count(found.points)
+    array = _some(found.points, MOST_POINTS)
+    samples, normals = _cloud_samples(array)
+    return Object(array, None, samples, normals, _size(array, samples), views, found.table)
+
+
+def _some(points: Floats, most: int) -> Floats:
+    """At most so many of the points, the same ones every time."""
+    if len(points) <= most:
+        return points
+    random = np.random.Generator(np.random.Philox(0))
+    return points[np.sort(random.choice(len(points), most, replace=False))]
+
+
+def _check_count(points: Floats) -> None:
+    if len(points) < FEWEST_POINTS:
         raise GraspModuliError(
-            f"object must be a whole OFF file, got {path} with {len(rows) - 1} of {wanted} "
-            "announced rows"
+            f"object must have at least {FEWEST_POINTS} points for a fit, got {len(points)}"
         )
 
 
-def _check_pcd(path: Path) -> None:
-    """Refuses a PCD file with fewer points than its header announces."""
-    header: dict[bytes, list[bytes]] = {}
-    with path.open("rb") as file:
-        for line in file:
-            words = line.split()
-            if words:
-                header[words[0]] = words[1:]
-            if words[:1] == [b"DATA"]:
-                break
-        else:
-            raise GraspModuliError(f"object must be a whole PCD file, got {path} without its data")
-        wanted = int(header[b"POINTS"][0])
-        kind = header[b"DATA"][0]
-        if kind == b"ascii":
-            found = sum(1 for line in file if line.strip())
-        elif kind == b"binary":
-            sizes = [int(size) for size in header[b"SIZE"]]
-            counts = [int(count) for count in header.get(b"COUNT", [b"1"] * len(sizes))]
-            row = sum(size * count for size, count in zip(sizes, counts, strict=True))
-            found = len(file.read()) // row
-        else:
-            # A compressed block knows its own length.
-            return
-    if found < wanted:
-        raise GraspModuliError(
-            f"object must be a whole PCD file, got {path} with {found} of {wanted} announced points"
-        )
-
-
-def _without_missing(array: Floats) -> Floats:
-    """A cloud as rows, without those that are NaN throughout: pixels of a camera without depth."""
-    if array.ndim == 3 and array.shape[2] == 3:
-        array = array.reshape(-1, 3)
+def _of_mesh(points: Any, faces: Any, number: int | None, notes: list[str]) -> Object:
+    array = numbers("object", points)
     if array.ndim != 2 or array.shape[1] != 3:
         raise GraspModuliError(f"object must have points of shape (n, 3), got {array.shape}")
-    missing = np.isnan(array).all(axis=1)
-    if missing.any():
-        warnings.warn(
-            f"{missing.sum():,} of {len(array):,} points are NaN, missing pixels, and left out",
-            stacklevel=TO_CALLER,
-        )
-    return np.ascontiguousarray(array[~missing])
-
-
-def _checked(points: Any, faces: Any) -> Object:
-    array = numbers("object", points)
-    if faces is None:
-        array = _without_missing(array)
-    elif array.ndim != 2 or array.shape[1] != 3:
-        raise GraspModuliError(f"object must have points of shape (n, 3), got {array.shape}")
     finite("object", array)
-    triangles: NDArray[np.int64] | None = None
-    if faces is not None:
-        triangles = np.asarray(faces)
-        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
-            raise GraspModuliError(
-                f"object must have triangles as whole numbers of shape (k, 3), "
-                f"got {triangles.dtype} {triangles.shape}"
-            )
-        triangles = triangles.astype(np.int64)
-        if len(triangles) and not (triangles.min() >= 0 and triangles.max() < len(array)):
-            raise GraspModuliError(
-                f"object must have triangles among its {len(array)} vertices, "
-                f"got vertex {triangles.max()}"
-            )
-        array, triangles = _used(array, triangles)
-    elif len(array) < FEWEST_POINTS:
+    triangles = np.asarray(faces)
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
         raise GraspModuliError(
-            f"object must have at least {FEWEST_POINTS} points for a fit, got {len(array)}"
+            f"object must have triangles as whole numbers of shape (k, 3), "
+            f"got {triangles.dtype} {triangles.shape}"
         )
+    triangles = triangles.astype(np.int64)
+    if len(triangles) and not (triangles.min() >= 0 and triangles.max() < len(array)):
+        raise GraspModuliError(
+            f"object must have triangles among its {len(array)} vertices, "
+            f"got vertex {triangles.max()}"
+        )
+    array, triangles = _used(array, triangles)
     if len(array) < 4:
         raise GraspModuliError(f"object must have at least 4 points, got {len(array)}")
     _check_extent(array)
     _check_solid(array)
-    if triangles is None and len(array) > MOST_POINTS:
-        random = np.random.Generator(np.random.Philox(0))
-        array = array[np.sort(random.choice(len(array), MOST_POINTS, replace=False))]
-    if triangles is None:
-        samples, normals = _cloud_samples(array)
-    else:
+    samples, normals = _mesh_samples(array, triangles)
+    chosen = _single(array, triangles, samples, number, notes)
+    if chosen is not None:
+        array, triangles = _used(array, chosen)
         samples, normals = _mesh_samples(array, triangles)
-    centered = samples - samples.mean(axis=0)
-    axes = np.linalg.svd(centered, full_matrices=False)[2]
-    size = float(np.ptp(array @ axes.T, axis=0).max())
-    result = Object(array, triangles, samples, normals, size)
-    _check_single(result)
-    return result
+    return Object(array, triangles, samples, normals, _size(array, samples))
+
+
+def _size(points: Floats, samples: Floats) -> float:
+    """The largest extent along the principal axes of the samples."""
+    axes = np.linalg.svd(samples - samples.mean(axis=0), full_matrices=False)[2]
+    return float(np.ptp(points @ axes.T, axis=0).max())
 
 
 def _used(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
@@ -397,48 +292,40 @@ def _cloud_samples(points: Floats) -> tuple[Floats, Floats]:
     return samples, np.ascontiguousarray(vectors[:, :, 0])
 
 
-def _check_single(thing: Object) -> None:
-    """Refuses several objects, large parts with clear space between them, and tells of small ones.
+def _single(
+    points: Floats,
+    faces: NDArray[np.int64],
+    samples: Floats,
+    number: int | None,
+    notes: list[str],
+) -> NDArray[np.int64] | None:
+    """The triangles of the object of this number, where there are several; tells of small parts.
 
-    Space is clear if it is wide beside the object and beside the samples' own distances.
+    Objects are large parts with clear space between them: wide beside all, and beside the
+    samples' own distances.
     """
     from scipy.spatial import KDTree
 
-    tree = KDTree(thing.samples)
-    distances: Any = tree.query(thing.samples, k=2)[0]
-    near = 4.0 * float(np.median(distances[:, 1]))
-
-    def shares(gap: float) -> Floats:
-        return np.sort(_parts(tree, max(gap * thing.size, near)))[::-1] / len(thing.samples)
-
-    cloud = thing.faces is None
-    apart = shares(GAP_IN_CLOUD if cloud else GAP_IN_MESH)
-    parts = int((apart > SMALLEST_PART).sum())
-    if parts > 1:
+    tree = KDTree(samples)
+    distances: Any = tree.query(samples, k=2)[0]
+    size = _size(points, samples)
+    part = parts_of(tree, max(GAP_IN_MESH * size, 4.0 * float(np.median(distances[:, 1]))))
+    shares = np.bincount(part) / len(samples)
+    order = np.argsort(-shares, kind="stable")
+    objects = [int(k) for k in order if shares[k] > SMALLEST_PART]
+    if len(objects) > 1 and number is None:
         raise GraspModuliError(
-            f"object must be a single one, got {parts} parts with space between them; "
-            "put each into a file of its own"
+            described([samples[part == k] for k in objects], "of the area", len(samples))
         )
-    parts = int((shares(GAP_IN_MESH) > SMALLEST_PART).sum())
-    if parts > 1:
-        warnings.warn(
-            f"the object's points are in {parts} parts with a narrow space between them; "
-            "they are taken for one object",
-            stacklevel=TO_CALLER,
+    if number is not None and number > max(len(objects), 1):
+        raise GraspModuliError(
+            f"object_number must be from 1 to {max(len(objects), 1)}, got {number}"
         )
-    noise = 1.0 - float(apart[0])
+    if len(objects) > 1 and number is not None:
+        # A triangle belongs to the sample that is nearest.
+        owner = part[tree.query(points[faces].mean(axis=1))[1]]
+        return faces[owner == objects[number - 1]]
+    noise = 1.0 - float(shares[order[0]])
     if noise > MUCH_NOISE:
-        warnings.warn(
-            f"{noise:.1%} of the object lies apart from the rest and is taken for noise",
-            stacklevel=TO_CALLER,
-        )
-
-
-def _parts(tree: Any, reach: float) -> NDArray[np.int64]:
-    """Sizes of the sets of points that are connected in steps of at most ``reach``."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = tree.query_pairs(reach, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(tree.n, tree.n))
-    return np.bincount(connected_components(graph, directed=False)[1])
+        notes.append(f"{noise:.1%} of the object lies apart from the rest and is taken for noise")
+    return None

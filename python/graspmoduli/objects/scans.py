@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._core import GraspModuliError
-from .views import Booleans, View
+from .views import Booleans, View, is_free
 
 #: A point is a flying pixel if its neighbours are farther away than those of others, by this.
 FLYING = 3.5
@@ -49,6 +48,9 @@ class Cleaned(NamedTuple):
     #: Shares of the points that were flying pixels, and of the table.
     flying: float
     of_table: float
+    #: In how many parts the object came, and the share of points that are no object's.
+    parts: int
+    apart: float
 
 
 def without_flying(points: Floats) -> Booleans:
@@ -126,8 +128,11 @@ def _spreads(points: Floats, on: Booleans, above: Booleans, normal: Floats, seen
     return around >= (AROUND_SEEN if seen else AROUND)
 
 
-def objects_of(points: Floats, views: tuple[View, ...], table: Plane | None) -> NDArray[np.int64]:
-    """The number of the object that each point belongs to, most points first; -1 for noise.
+def objects_of(
+    points: Floats, views: tuple[View, ...], table: Plane | None
+) -> tuple[NDArray[np.int64], list[int]]:
+    """The number of the object that each point belongs to, most points first, -1 for noise; and
+    of how many large parts each object is.
 
     Parts with a narrow space between them are one object, and so are parts of which one hides
     where the other goes on: a cup's far wall behind its near rim. On a table the far one is an
@@ -145,7 +150,7 @@ def objects_of(points: Floats, views: tuple[View, ...], table: Plane | None) -> 
     counts = np.bincount(part)
     large = np.flatnonzero(counts >= max(SMALLEST_PART * len(points), 10))
     if len(large) == 0:
-        return np.zeros(len(points), dtype=np.int64)
+        return np.zeros(len(points), dtype=np.int64), [1]
     trees = {k: KDTree(points[part == k]) for k in large}
     links = []
     for i, one in enumerate(large):
@@ -157,7 +162,7 @@ def objects_of(points: Floats, views: tuple[View, ...], table: Plane | None) -> 
     joined = connected_components(graph, directed=False)[1]
     number = np.full(len(counts), -1, dtype=np.int64)
     number[large] = joined[large]
-    owner = number[part]
+    owner: NDArray[np.int64] = number[part]
     # Small pieces near an object are its own.
     loose = np.flatnonzero(owner < 0)
     if len(loose):
@@ -165,29 +170,33 @@ def objects_of(points: Floats, views: tuple[View, ...], table: Plane | None) -> 
         away, nearest = KDTree(points[firm]).query(points[loose])
         close = away < GAP / 2 * size
         owner[loose[close]] = owner[firm[nearest[close]]]
-    kinds, renumbered, sizes = np.unique(
-        owner[owner >= 0], return_inverse=True, return_counts=True
-    )
+    kinds, renumbered, sizes = np.unique(owner[owner >= 0], return_inverse=True, return_counts=True)
     rank = np.empty(len(kinds), dtype=np.int64)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(kinds))
     owner[owner >= 0] = rank[renumbered]
-    return owner
+    parts = [int((joined[large] == kind).sum()) for kind in kinds]
+    return owner, [parts[k] for k in np.argsort(-sizes, kind="stable")]
 
 
 def _connected(points: Floats, near: float) -> NDArray[np.int64]:
-    """A number for each set of points that are connected in steps of at most ``near``."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """A number for each set of points that are connected in steps of at most about ``near``."""
+    from scipy.spatial import KDTree
 
     # Cells that touch: every step in space is one between neighbouring cells, or within one.
     cells, index = np.unique(
         np.floor((points - points.min(axis=0)) / near).astype(np.int64), axis=0, return_inverse=True
     )
-    from scipy.spatial import KDTree
+    return parts_of(KDTree(cells), 1.8)[index.ravel()]
 
-    pairs = KDTree(cells).query_pairs(1.8, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells),) * 2)
-    return connected_components(graph, directed=False)[1][index.ravel()].astype(np.int64)
+
+def parts_of(tree: Any, reach: float) -> NDArray[np.int64]:
+    """A number for each set of a tree's points that are connected in steps of at most ``reach``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = tree.query_pairs(reach, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(tree.n, tree.n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _is_one(
@@ -204,7 +213,9 @@ def _is_one(
     least = float(distances.min())
     if least < GAP * size:
         return True
-    if not views or least > HIDDEN_GAP * min(np.ptp(one, axis=0).max(), np.ptp(other, axis=0).max()):
+    if not views or least > HIDDEN_GAP * min(
+        np.ptp(one, axis=0).max(), np.ptp(other, axis=0).max()
+    ):
         return False
     if table is not None:
         stand = [table.height(p).min() < 0.05 * size for p in (one, other)]
@@ -214,10 +225,7 @@ def _is_one(
     near = np.argsort(distances, kind="stable")[:200]
     steps = np.linspace(0.1, 0.9, 9)[:, None, None]
     ways = one[index[near]] * steps + other[near] * (1.0 - steps)
-    free = np.zeros(ways.shape[:2], dtype=bool)
-    for view in views:
-        free |= view.is_free(ways, size)
-    return bool((~free.any(axis=0)).any())
+    return bool((~is_free(views, ways, size).any(axis=0)).any())
 
 
 def cleaned(
@@ -236,22 +244,28 @@ def cleaned(
     if table is not None:
         height = table.height(points)
         near = height[np.abs(height) < 0.01 * float(np.ptp(points, axis=0).max())]
-        above = height > 4.0 * max(1.5 * float(np.median(np.abs(near))), 1e-9)
+        above = height > 6.0 * float(np.median(np.abs(near)))
         share = 1.0 - float(above.mean())
         points = points[above]
-    owner = objects_of(points, views, table)
-    count = int(owner.max()) + 1
-    if count > 1 and number is None:
-        found = "; ".join(_described(k, points[owner == k]) for k in range(count))
-        raise GraspModuliError(
-            f"object must be a single one, got {count} ({found}); choose one by its number"
-        )
+    owner, parts = objects_of(points, views, table)
+    objects = [points[owner == k] for k in range(len(parts))]
+    if len(objects) > 1 and number is None:
+        raise GraspModuliError(described(objects, "of the points", len(points)))
     chosen = 1 if number is None else number
-    if not 1 <= chosen <= count:
-        raise GraspModuliError(f"object_number must be from 1 to {count}, got {number}")
-    return Cleaned(points[owner == chosen - 1], table, flying, share)
+    if chosen > len(objects):
+        raise GraspModuliError(f"object_number must be from 1 to {len(objects)}, got {number}")
+    apart = float((owner < 0).mean())
+    return Cleaned(objects[chosen - 1], table, flying, share, parts[chosen - 1], apart)
 
 
-def _described(k: int, points: Floats) -> str:
-    middle = ", ".join(f"{x:.3g}" for x in points.mean(axis=0))
-    return f"{k + 1}: {len(points):,} points about ({middle})"
+def described(objects: list[Floats], of: str, total: int) -> str:
+    """What to say where there are several objects, by some points of each."""
+    found = "; ".join(
+        f"{k}: {len(points) / total:.0%} {of}, about "
+        f"({', '.join(f'{x:.3g}' for x in points.mean(axis=0))})"
+        for k, points in enumerate(objects, 1)
+    )
+    return (
+        f"object must be a single one, got {len(objects)} with space between them ({found}); "
+        "choose one by its object number"
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,14 @@ class View:
         return (depth < nearest - BEFORE * size).reshape(shape)
 
 
+def is_free(views: tuple[View, ...], points: Floats, size: float) -> Booleans:
+    """Did any of the views see the place of each point to be empty? Shape (..., 3) to (...)."""
+    free = np.zeros(points.shape[:-1], dtype=bool)
+    for view in views:
+        free |= view.is_free(points, size)
+    return free
+
+
 def _projected(projection: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
     """Column, row and depth of points. Shapes (n,)."""
     ahead = points @ projection[:, :3].T + projection[:, 3]
@@ -55,7 +64,7 @@ def _projected(projection: Floats, points: Floats) -> tuple[Floats, Floats, Floa
         return ahead[:, 0] / ahead[:, 2], ahead[:, 1] / ahead[:, 2], ahead[:, 2]
 
 
-def of_image(points: Floats, known: Booleans | None = None) -> View | None:
+def of_image(points: Floats) -> View | None:
     """The view of an organised cloud (rows, columns, 3), NaN where nothing came back.
 
     Where the camera was follows from the points: they lie on the rays of their pixels. None if
@@ -75,7 +84,20 @@ def of_image(points: Floats, known: Booleans | None = None) -> View | None:
         return None
     depth = np.full(valid.shape, np.inf)
     depth[valid] = _projected(projection, points[valid])[2]
-    return _view(projection, depth, known)
+    return _view(projection, depth)
+
+
+def of_depth(depth: Floats, intrinsics: tuple[float, float, float, float], pose: Floats) -> View:
+    """The view of a depth image, NaN where nothing came back.
+
+    Pixels are counted from 0 at their middles; the camera looks along its z, x to the right and y
+    down; the pose takes its coordinates to those of the object.
+    """
+    fx, fy, cx, cy = intrinsics
+    to_pixels = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    turn = pose[:3, :3].T
+    projection = to_pixels @ np.concatenate([turn, -(turn @ pose[:3, 3])[:, None]], axis=1)
+    return _view(projection, np.where(np.isnan(depth), np.inf, depth))
 
 
 def of_camera(points: Floats, camera: Floats) -> View | None:
@@ -112,18 +134,22 @@ def of_camera(points: Floats, camera: Floats) -> View | None:
     depth = np.full((rows, columns), np.inf)
     at = np.rint(row).astype(np.int64), np.rint(column).astype(np.int64)
     np.minimum.at(depth, at, away_by)
-    return _view(projection, depth, None)
+    return _view(projection, depth)
 
 
-def _view(projection: Floats, depth: Floats, known: Booleans | None) -> View:
-    from scipy.ndimage import minimum_filter
+def _view(projection: Floats, depth: Floats) -> View:
+    from scipy.ndimage import label, minimum_filter
 
     reach = int(REACH)
     around = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1]) <= REACH
     nearest = minimum_filter(depth, footprint=around, mode="constant", cval=np.inf)
-    if known is not None:
-        nearest = np.where(known, nearest, -np.inf)
-    camera = -np.linalg.solve(projection[:, :3], projection[:, 3])
+    # Nothing came back from the void, nor from what is dark or shines; only the void is known to
+    # reach the edge of the image.
+    found: Any = label(np.isinf(nearest))
+    areas = found[0]
+    edge = np.concatenate([areas[0], areas[-1], areas[:, 0], areas[:, -1]])
+    nearest[(areas > 0) & ~np.isin(areas, edge)] = -np.inf
+    camera: Floats = -np.asarray(np.linalg.solve(projection[:, :3], projection[:, 3]))
     return View(camera, projection, nearest)
 
 
