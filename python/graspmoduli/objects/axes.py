@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._core import cos, sin, solve_banded
+from ..surfaces import Surface
 from .reading import Object
-from .views import is_free
-from .walls import CLOSE, Axis, Grid, coarse_hits, outermost, regress
+from .views import hidden, is_free
+from .walls import CLOSE, Axis, Grid, Shape, coarse_hits, outermost, regress
 
-#: Weight of the share of a surface that is where a camera saw nothing to be.
-INTO_VOID = 4.0
+#: Weights of the share of a surface that is where a camera saw nothing to be, and of the share of
+#: what faces a camera that lies behind what it saw.
+INTO_VOID, HIDDEN = 4.0, 1.0
+#: Farther than this from the middle of what was seen, over the size, there is nothing either.
+FARTHEST = 0.75
 #: Numbers of order 1 this close are equal but for rounding.
 TIE = 1e-9
 
@@ -215,17 +219,19 @@ def score(thing: Object, axis: Axis) -> float:
     # the true axis, fewer about many others.
     mesh = thing.faces is not None
     unseen = 2.5 * (1.0 - seen) if mesh else 0.4 * max(0.0, 0.6 - seen)
-    void = INTO_VOID * _in_void(thing, axis, grid, rings)
-    return misfit + oval + 0.1 * pinched + 2.0 * missed + unseen + void
+    doubt = _doubt(thing, axis, shape, grid)
+    return misfit + oval + 0.1 * pinched + 2.0 * missed + unseen + doubt
 
 
-def _in_void(thing: Object, axis: Axis, grid: Grid, rings: Floats) -> float:
-    """Share of a surface's points where a camera saw that there is nothing."""
-    if not thing.views:
+def _doubt(thing: Object, axis: Axis, shape: Shape, grid: Grid) -> float:
+    """How much of a surface is where cameras saw that there is nothing, or hides from them."""
+    if thing.faces is not None:
         return 0.0
-    rows, columns = rings.shape
-    height = grid.low + (np.arange(rows) + 0.5) / rows * (grid.high - grid.low)
-    angle = np.arange(columns) * 2 * np.pi / columns
-    around = np.stack([cos(angle), sin(angle), np.zeros(columns)], axis=1)
-    local = rings[:, :, None] * around + height[:, None, None] * np.array([0.0, 0.0, 1.0])
-    return float(is_free(thing.views, axis.origin + local @ axis.rotation.T, thing.size).mean())
+    u, theta = np.meshgrid((np.arange(24) + 0.5) / 24, np.arange(24) * np.pi / 12, indexing="ij")
+    surface = Surface.from_coefficients(shape.coefficients, grid.low, grid.high)
+    points = axis.origin + surface.points(u, theta) @ axis.rotation.T
+    inward = surface.normals(u, theta) @ axis.rotation.T
+    middle = (thing.samples.min(axis=0) + thing.samples.max(axis=0)) / 2
+    away = np.sqrt(((points - middle) ** 2).sum(axis=-1))
+    void = is_free(thing.views, points, thing.size) | (away > FARTHEST * thing.size)
+    return INTO_VOID * float(void.mean()) + HIDDEN * hidden(thing.views, points, inward, thing.size)

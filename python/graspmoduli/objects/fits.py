@@ -31,6 +31,7 @@ from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
 from .object_grasps import ObjectGrasp, by_errors, by_round_cones
 from .reading import read
+from .scanned import Scanned
 from .touching import (
     TIP,
     Pressed,
@@ -90,6 +91,8 @@ class Fit(Value):
     allowed: Booleans = field(repr=False)
     #: The object's mesh, where it came as one: grasps are pressed on it.
     mesh: TriangleMesh | None = None
+    #: The object's points, where it came as a cloud: contacts that were seen are pressed on them.
+    scanned: Scanned | None = None
 
     @property
     def center_of_mass(self) -> Floats:
@@ -224,28 +227,55 @@ class Fit(Value):
                 'contacts must be 3, torsion 0 and norm "sum" for a cloud of points, '
                 f'got {size}, {torsion:g} and "{NORMS[each]}"; a mesh takes others'
             )
-        for name, value in (("tip_radius", tip_radius), ("errors", errors)):
-            if value is not None:
-                raise GraspModuliError(
-                    f"{name} must be left out for a cloud of points, got {value:g}: fingertips are "
-                    "pressed on meshes only"
-                )
+        if errors is not None:
+            raise GraspModuliError(
+                f"errors must be left out for a cloud of points, got {errors:g}: they are tried on "
+                "meshes only"
+            )
+        radius = TIP * self.residual.size
+        if tip_radius is not None:
+            radius = number("tip_radius", tip_radius, positive=True)
         scale = self._surface_radius
-        # Where contacts are not allowed everywhere, more starts find better grasps.
-        found = synthesize(
-            self.unit_surface,
-            top=top,
-            starts=min(2 * top + 6, MOST_FOLLOWED),
-            friction=mu if len(mu) > 1 else mu[0],
-            edges=edges,
-            seed=seed,
-            allowed=self.allowed,
-            center_of_mass=(center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale,
-        )
-        # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in those
-        # of the object differs slightly from the surface's own.
-        grasps = [self._placed(ranked.grasp, hand, center) for ranked in found]
-        return sorted((g for g in grasps if g.quality > 0.0), key=by_round_cones, reverse=True)
+        sure = None if self.scanned is None else self.scanned.sure
+        # A finger that must meet what was seen is not in thin air, wherever it meets it.
+        for allowed in (self.allowed,) if sure is None else (self.allowed & sure, self.allowed):
+            if not allowed.any():
+                continue
+            # Where contacts are not allowed everywhere, more starts find better grasps.
+            found = synthesize(
+                self.unit_surface,
+                top=top,
+                starts=min(2 * top + 6, MOST_FOLLOWED),
+                friction=mu if len(mu) > 1 else mu[0],
+                edges=edges,
+                seed=seed,
+                allowed=allowed,
+                center_of_mass=(center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale,
+            )
+            # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in
+            # those of the object differs slightly from the surface's own.
+            placed = [self._pressed_on_points(one.grasp, hand, center, radius) for one in found]
+            grasps = [one for one in placed if one is not None and one.quality > 0.0]
+            if grasps:
+                return sorted(grasps, key=by_round_cones, reverse=True)
+        return []
+
+    def _pressed_on_points(
+        self, grasp: Grasp, hand: Cone, center: Floats, radius: float
+    ) -> ObjectGrasp | None:
+        """A grasp with its contacts where tips meet the points; None if one is blocked."""
+        contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
+        normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
+        if self.scanned is None:
+            return self._object_grasp(grasp, contacts, normals, hand, center)
+        checks = []
+        for k, (contact, normal) in enumerate(zip(contacts, normals, strict=True)):
+            pressed = self.scanned.press(contact, normal, radius)
+            if pressed is None:
+                return None
+            contacts[k], normals[k], check = pressed
+            checks.append(check)
+        return self._object_grasp(grasp, contacts, normals, hand, center, checks=tuple(checks))
 
     def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""
@@ -415,14 +445,8 @@ class Fit(Value):
                 residual=[self.residual.rms, self.residual.max, self.residual.size],
                 shares=[self.coverage, self.unexplained],
                 allowed=self.allowed,
-                **(
-                    {}
-                    if self.mesh is None
-                    else {
-                        "vertices": self.mesh.vertices,
-                        "faces": self.mesh.faces,
-                    }
-                ),
+                **({} if self.mesh is None else self.mesh.saved()),
+                **({} if self.scanned is None else self.scanned.saved()),
             )
 
     @classmethod
@@ -443,6 +467,7 @@ class Fit(Value):
                         unexplained=unexplained,
                         allowed=data["allowed"].astype(bool, casting="no"),
                         mesh=_saved_mesh(data),
+                        scanned=Scanned.loaded(data, float(data["residual"][2])),
                     )
         except FileNotFoundError:
             raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None

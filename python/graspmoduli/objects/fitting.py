@@ -27,8 +27,9 @@ from .fits import Fit as Fit
 from .fits import Residual as Residual
 from .object_grasps import ObjectGrasp as ObjectGrasp
 from .reading import Object, read
+from .scanned import Scanned
 from .touching import TIP, TriangleMesh
-from .views import is_free
+from .views import is_free, meet
 from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regress
 
 #: More unexplained than this is refused, of a cloud of points.
@@ -171,7 +172,12 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     if mesh:
         # Where no ray hits a mesh there is nothing to touch.
         allowed &= seen.reshape(grid.rows, grid.columns)
-    allowed &= ~_closed(thing, surface, pose, allowed.shape)
+    sure = None
+    if not mesh:
+        points, ways = _cells(surface, pose, allowed.shape)
+        allowed &= ~_closed(thing, points, ways)
+        if thing.views:
+            sure = meet(thing.views, points, ways, thing.size)
     rim = max(1, round(0.03 * grid.rows))
     allowed[:rim] = allowed[-rim:] = False
 
@@ -187,26 +193,29 @@ def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
         unexplained=unexplained,
         allowed=allowed,
         mesh=body,
+        scanned=None if mesh else Scanned(thing.points, thing.size, sure),
     )
 
 
-def _closed(thing: Object, surface: Surface, pose: Floats, shape: tuple[int, ...]) -> Booleans:
-    """Cells of the surface where a camera saw nothing to be, or where the table is in the way."""
+def _cells(surface: Surface, pose: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Points and normals of the surface, in the object's coordinates, in the middles of cells."""
     rows, columns = shape
     u, theta = np.meshgrid(
         (np.arange(rows) + 0.5) / rows,
         (np.arange(columns) + 0.5) * 2 * np.pi / columns,
         indexing="ij",
     )
-    points = surface.points(u, theta) @ pose[:3, :3].T + pose[:3, 3]
+    turn = pose[:3, :3].T
+    return surface.points(u, theta) @ turn + pose[:3, 3], surface.normals(u, theta) @ turn
+
+
+def _closed(thing: Object, points: Floats, ways: Floats) -> Booleans:
+    """Where a camera saw nothing to be, or the table is in the way."""
     closed = is_free(thing.views, points, thing.size)
     if thing.table is not None:
-        normals = surface.normals(u, theta) @ pose[:3, :3].T
         # Neither the tip nor a finger as long as the object may reach into it.
-        low = np.minimum(
-            thing.table.height(points), thing.table.height(points - thing.size * normals)
-        )
-        closed |= low < TIP * thing.size
+        finger = thing.table.height(points - thing.size * ways)
+        closed |= np.minimum(thing.table.height(points), finger) < TIP * thing.size
     return closed
 
 

@@ -162,7 +162,7 @@ def objects_of(
     joined = connected_components(graph, directed=False)[1]
     number = np.full(len(counts), -1, dtype=np.int64)
     number[large] = joined[large]
-    owner: NDArray[np.int64] = number[part]
+    owner = np.asarray(number[part])
     # Small pieces near an object are its own.
     loose = np.flatnonzero(owner < 0)
     if len(loose):

@@ -64,6 +64,10 @@ class TriangleMesh:
         """The mesh of an object that has been read, if it has one."""
         return None if thing.faces is None else cls(thing.points, thing.faces, thing.size)
 
+    def saved(self) -> dict[str, Any]:
+        """Arrays for a file."""
+        return {"vertices": self.vertices, "faces": self.faces}
+
     def __reduce__(self) -> tuple[Any, ...]:
         return TriangleMesh, (self.vertices, self.faces, self.size)
 

@@ -14,6 +14,8 @@ from .._arrays import Floats
 REACH = 2.2
 #: Space is free if it is nearer to the camera than what was seen, by this share of the size.
 BEFORE = 0.03
+#: How far before and behind a contact a finger's way is followed, and in which steps, by the size.
+AROUND_CONTACT, THROUGH, STEP = 0.05, 1.0, 0.01
 #: An organised cloud is the image of a pinhole if its points lie this close to their pixels.
 PINHOLE = 0.5
 #: Most pixels from which a projection is found.
@@ -48,6 +50,17 @@ class View:
         nearest[seen] = self.depth[at]
         return (depth < nearest - BEFORE * size).reshape(shape)
 
+    def behind(self, points: Floats) -> Floats:
+        """How far behind what was seen points are; NaN beside that. Shape (..., 3) to (...)."""
+        column, row, depth = _projected(self.projection, points.reshape(-1, 3))
+        rows, columns = self.depth.shape
+        within = (depth > 0.0) & (column > -0.5) & (column < columns - 0.5)
+        within &= (row > -0.5) & (row < rows - 0.5)
+        nearest = np.full(len(depth), np.nan)
+        at = np.rint(row[within]).astype(np.int64), np.rint(column[within]).astype(np.int64)
+        nearest[within] = np.where(np.isfinite(self.depth[at]), self.depth[at], np.nan)
+        return (depth - nearest).reshape(points.shape[:-1])
+
 
 def is_free(views: tuple[View, ...], points: Floats, size: float) -> Booleans:
     """Did any of the views see the place of each point to be empty? Shape (..., 3) to (...)."""
@@ -55,6 +68,36 @@ def is_free(views: tuple[View, ...], points: Floats, size: float) -> Booleans:
     for view in views:
         free |= view.is_free(points, size)
     return free
+
+
+def meet(views: tuple[View, ...], points: Floats, ways: Floats, size: float) -> Booleans:
+    """Must a straight finger that goes on from each point along its way meet what was seen?
+
+    It does where it would come out of the object through a surface that a camera saw.
+    """
+    along = np.arange(-AROUND_CONTACT, THROUGH, STEP)
+    steps = points[..., None, :] + size * along[:, None] * ways[..., None, :]
+    met = np.zeros(points.shape[:-1], dtype=bool)
+    for view in views:
+        behind = view.behind(steps) / size
+        one, next_one = behind[..., :-1], behind[..., 1:]
+        with np.errstate(invalid="ignore"):
+            through = (one < 0.0) != (next_one < 0.0)
+            # At the edge of what is in front the depth jumps.
+            through &= (np.abs(one) < BEFORE) & (np.abs(next_one) < BEFORE)
+        met |= through.any(axis=-1)
+    return met
+
+
+def hidden(views: tuple[View, ...], points: Floats, inward: Floats, size: float) -> float:
+    """Share of what of a surface faces a camera that lies behind what it saw."""
+    facing = behind = 0
+    for view in views:
+        front = ((points - view.camera) * inward).sum(axis=-1) > 0.0
+        facing += int(front.sum())
+        with np.errstate(invalid="ignore"):
+            behind += int((view.behind(points[front]) > BEFORE * size).sum())
+    return behind / max(facing, 1)
 
 
 def _projected(projection: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
@@ -149,7 +192,7 @@ def _view(projection: Floats, depth: Floats) -> View:
     areas = found[0]
     edge = np.concatenate([areas[0], areas[-1], areas[:, 0], areas[:, -1]])
     nearest[(areas > 0) & ~np.isin(areas, edge)] = -np.inf
-    camera: Floats = -np.asarray(np.linalg.solve(projection[:, :3], projection[:, 3]))
+    camera = -np.linalg.solve(projection[:, :3], projection[:, 3]).astype(np.float64)
     return View(camera, projection, nearest)
 
 
