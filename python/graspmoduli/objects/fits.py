@@ -458,16 +458,17 @@ class Fit(Value):
                 version = int(data["graspmoduli_fit"])
                 if version == FILE_VERSION:
                     bottom, top = data["heights"].tolist()
+                    residual = Residual(*data["residual"].tolist())
                     coverage, unexplained = data["shares"].tolist()
                     return cls(
                         surface=Surface.from_coefficients(data["coefficients"], bottom, top),
                         pose=locked(floats("pose", data["pose"]).reshape(4, 4)),
-                        residual=Residual(*data["residual"].tolist()),
+                        residual=residual,
                         coverage=coverage,
                         unexplained=unexplained,
                         allowed=data["allowed"].astype(bool, casting="no"),
-                        mesh=_saved_mesh(data),
-                        scanned=Scanned.loaded(data, float(data["residual"][2])),
+                        mesh=TriangleMesh.loaded(data, residual.size),
+                        scanned=Scanned.loaded(data, residual.size),
                     )
         except FileNotFoundError:
             raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None
@@ -489,14 +490,3 @@ class Fit(Value):
         """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
         given = finite("directions", vectors("directions", directions, "(..., 3)"))
         return given @ self.pose[:3, :3].T
-
-
-def _saved_mesh(data: Any) -> TriangleMesh | None:
-    if "vertices" not in data:
-        return None
-    size = float(data["residual"][2])
-    vertices = floats("vertices", data["vertices"]).reshape(-1, 3)
-    faces = data["faces"].astype(np.int64, casting="no").reshape(-1, 3)
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise GraspModuliError("faces must be among the vertices")
-    return TriangleMesh(vertices, faces, size)

@@ -52,8 +52,7 @@ class Scanned(Value):
         return (
             self.size == other.size
             and np.array_equal(self.points, other.points)
-            and (self.sure is None) == (other.sure is None)
-            and (self.sure is None or np.array_equal(self.sure, other.sure))
+            and np.array_equal(_cells(self.sure), _cells(other.sure))
         )
 
     def __hash__(self) -> int:
@@ -140,3 +139,7 @@ class Scanned(Value):
         sector = (np.arctan2(y, x) / (2.0 * np.pi) * 8.0).astype(int) % 8
         bearing = len(np.unique(sector)) / 8.0
         return float(found[0]) * radius, normal, bearing
+
+
+def _cells(sure: Booleans | None) -> Booleans:
+    return np.zeros((0, 0), dtype=np.bool_) if sure is None else sure

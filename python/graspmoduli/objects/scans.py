@@ -162,14 +162,14 @@ def objects_of(
     joined = connected_components(graph, directed=False)[1]
     number = np.full(len(counts), -1, dtype=np.int64)
     number[large] = joined[large]
-    owner = np.asarray(number[part])
+    owner: NDArray[np.int64] = np.take(number, part)
     # Small pieces near an object are its own.
     loose = np.flatnonzero(owner < 0)
     if len(loose):
         firm = np.flatnonzero(owner >= 0)
         away, nearest = KDTree(points[firm]).query(points[loose])
         close = away < GAP / 2 * size
-        owner[loose[close]] = owner[firm[nearest[close]]]
+        owner[loose[close]] = owner[firm[np.asarray(nearest)[close]]]
     kinds, renumbered, sizes = np.unique(owner[owner >= 0], return_inverse=True, return_counts=True)
     rank = np.empty(len(kinds), dtype=np.int64)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(kinds))

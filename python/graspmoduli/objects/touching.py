@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import Floats, cores, count, locked, number
+from .._arrays import Floats, cores, count, floats, locked, number
 from .._batches import Cone
 from .._core import GraspModuliError
 from .._values import Value
@@ -67,6 +67,17 @@ class TriangleMesh:
     def saved(self) -> dict[str, Any]:
         """Arrays for a file."""
         return {"vertices": self.vertices, "faces": self.faces}
+
+    @classmethod
+    def loaded(cls, data: Any, size: float) -> TriangleMesh | None:
+        """From the arrays of a file, if they are there."""
+        if "vertices" not in data:
+            return None
+        vertices = floats("vertices", data["vertices"]).reshape(-1, 3)
+        faces = data["faces"].astype(np.int64, casting="no").reshape(-1, 3)
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise GraspModuliError("faces must be among the vertices")
+        return cls(vertices, faces, size)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return TriangleMesh, (self.vertices, self.faces, self.size)
