@@ -29,7 +29,7 @@ from ..quality import circular_quality, quality
 from ..surfaces import Surface
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
-from .object_grasps import ObjectGrasp, by_errors, by_round_cones
+from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
 from .reading import read
 from .scanned import Scanned
 from .touching import (
@@ -147,10 +147,13 @@ class Fit(Value):
         are less than half as good.
 
         Of a cloud of points, :func:`graspmoduli.synthesize` on the fitted surface, with contacts
-        where it explains the cloud or was not seen.
+        where it explains the cloud or was not seen, and where fingers must meet what was seen if
+        there are such grasps. Contacts on points are then pressed on them.
 
         The order follows the proven bounds for round friction cones, ``round_quality``, or
-        ``low_quality`` if errors are given. Qualities do not depend on the object's unit.
+        ``low_quality`` if errors are given. Of a cloud it follows what is left of them with half
+        the friction, both on the points and on the fitted surface, and how many contacts were
+        seen. Qualities do not depend on the object's unit.
 
         Parameters
         ----------
@@ -244,8 +247,8 @@ class Fit(Value):
             # Where contacts are not allowed everywhere, more starts find better grasps.
             found = synthesize(
                 self.unit_surface,
-                top=top,
-                starts=min(2 * top + 6, MOST_FOLLOWED),
+                top=min(2 * top + 2, MOST_FOLLOWED),
+                starts=min(4 * top + 4, MOST_FOLLOWED),
                 friction=mu if len(mu) > 1 else mu[0],
                 edges=edges,
                 seed=seed,
@@ -254,28 +257,31 @@ class Fit(Value):
             )
             # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in
             # those of the object differs slightly from the surface's own.
-            placed = [self._pressed_on_points(one.grasp, hand, center, radius) for one in found]
-            grasps = [one for one in placed if one is not None and one.quality > 0.0]
-            if grasps:
-                return sorted(grasps, key=by_round_cones, reverse=True)
+            ranked = []
+            for one in found:
+                flat = self._placed(one.grasp, hand, center)
+                pressed = self._pressed_on_points(flat, hand, center, radius)
+                if pressed is not None and min(flat.quality, pressed.quality) > 0.0:
+                    ranked.append((by_evidence(flat, pressed), pressed))
+            if ranked:
+                ranked.sort(key=lambda pair: pair[0], reverse=True)
+                return [grasp for _, grasp in ranked[:top]]
         return []
 
     def _pressed_on_points(
-        self, grasp: Grasp, hand: Cone, center: Floats, radius: float
+        self, flat: ObjectGrasp, hand: Cone, center: Floats, radius: float
     ) -> ObjectGrasp | None:
         """A grasp with its contacts where tips meet the points; None if one is blocked."""
-        contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
-        normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
         if self.scanned is None:
-            return self._object_grasp(grasp, contacts, normals, hand, center)
-        checks = []
-        for k, (contact, normal) in enumerate(zip(contacts, normals, strict=True)):
+            return flat
+        contacts, normals, checks = flat.contacts.copy(), flat.normals.copy(), []
+        for k, (contact, normal) in enumerate(zip(flat.contacts, flat.normals, strict=True)):
             pressed = self.scanned.press(contact, normal, radius)
             if pressed is None:
                 return None
             contacts[k], normals[k], check = pressed
             checks.append(check)
-        return self._object_grasp(grasp, contacts, normals, hand, center, checks=tuple(checks))
+        return self._object_grasp(flat.grasp, contacts, normals, hand, center, checks=tuple(checks))
 
     def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""

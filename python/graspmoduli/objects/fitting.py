@@ -22,7 +22,7 @@ from .._arrays import (
 from .._core import GraspModuliError
 from ..surfaces import Surface
 from .agreement import phantom_area, unexplained_area
-from .axes import candidate_axes, refined, same_axis, score
+from .axes import FARTHEST, candidate_axes, refined, same_axis, score
 from .fits import Fit as Fit
 from .fits import Residual as Residual
 from .object_grasps import ObjectGrasp as ObjectGrasp
@@ -36,6 +36,8 @@ from .walls import CLOSE, FOR_MESHES, FOR_SCANS, Axis, Booleans, fine_hits, regr
 MOST_UNEXPLAINED = 0.4
 #: Axes whose scores, numbers of order 1, are this close are equally good.
 TIE = 1e-6
+#: Of what lies on a table, contacts are at least so much of its height above it.
+LOW = 0.3
 #: More unexplained than this is worth a warning.
 WORTH_A_WARNING = 0.005
 #: So is more of a mesh's visible area, and less of the surface with the mesh near it.
@@ -210,12 +212,16 @@ def _cells(surface: Surface, pose: Floats, shape: tuple[int, ...]) -> tuple[Floa
 
 
 def _closed(thing: Object, points: Floats, ways: Floats) -> Booleans:
-    """Where a camera saw nothing to be, or the table is in the way."""
+    """Where a camera saw nothing, where the object cannot reach, or the table is in the way."""
     closed = is_free(thing.views, points, thing.size)
+    away = points - thing.points.mean(axis=0)
+    closed |= np.sqrt((away * away).sum(axis=-1)) > FARTHEST * thing.size
     if thing.table is not None:
-        # Neither the tip nor a finger as long as the object may reach into it.
+        # Neither the tip nor a finger as long as the object may reach into it; what lies flat is
+        # held by less of a tip.
         finger = thing.table.height(points - thing.size * ways)
-        closed |= np.minimum(thing.table.height(points), finger) < TIP * thing.size
+        margin = min(TIP * thing.size, LOW * float(thing.table.height(thing.points).max()))
+        closed |= np.minimum(thing.table.height(points), finger) < margin
     return closed
 
 

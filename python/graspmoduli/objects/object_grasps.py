@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .._arrays import (
-    Floats,
-)
+import numpy as np
+
+from .._arrays import Floats
 from ..grasps import Grasp, PlacedGrasp
+from ..quality import circular_quality
 from ..surfaces import Surface
-from .touching import (
-    ContactCheck,
-)
+from .touching import ContactCheck
+
+#: Half of the friction stands for what a scan does not tell; what is left then counts, and so does
+#: this share of the quality, and half as much again for each contact that was seen.
+LEFT, QUALITY, SEEN = 0.5, 0.1, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +69,18 @@ def by_round_cones(grasp: ObjectGrasp) -> float:
 def by_errors(grasp: ObjectGrasp) -> float:
     """What ranks a grasp under errors of aim."""
     return 0.0 if grasp.low_quality is None else grasp.low_quality
+
+
+def by_evidence(flat: ObjectGrasp, pressed: ObjectGrasp) -> float:
+    """What ranks a grasp of a scan, given on the fitted surface and on the points."""
+    left = min(
+        circular_quality(
+            one,
+            friction=LEFT * np.asarray(one.friction),
+            norm=one.norm,
+            length_scale=one.length_scale,
+        ).lower
+        for one in (flat, pressed)
+    )
+    seen = sum(check.seen for check in pressed.checks or ())
+    return (left + QUALITY * by_round_cones(pressed)) * (1.0 + SEEN * seen)

@@ -19,6 +19,9 @@ DEPTH = 1.0
 AROUND = 0.4
 #: cos 40°: what a tip feels is about what the fitted surface has there.
 ALIKE = 0.766
+#: A contact is seen if points lie under this share of the pad, and if what it feels differs from
+#: the fitted surface by at most 20°, in radians: at an edge or a rim neither is to be trusted.
+PAD, SURE = 0.75, 0.349
 #: Points in the way of a finger stop it, nearer than this to its middle, by the radius of its tip.
 IN_THE_WAY = 0.35
 #: So many points in the way are noise.
@@ -101,8 +104,9 @@ class Scanned(Value):
         _, normal, bearing = felt
         point = contact + landing * way
         angle = float(np.arccos(min(1.0, float(normal @ way))))
+        seen = bearing >= PAD and angle <= SURE
         # From the surface that is seen under the tip.
-        return point, normal, ContactCheck(0.0, angle, True, clearance, bearing)
+        return point, normal, ContactCheck(0.0, angle, seen, clearance, bearing)
 
     def _felt(
         self, away: Floats, along: Floats, beside: Floats, way: Floats, radius: float
@@ -136,7 +140,7 @@ class Scanned(Value):
         normal /= np.sqrt(normal @ normal)
         if abs(found[0]) > DEPTH or normal @ way < ALIKE:
             return None
-        sector = (np.arctan2(y, x) / (2.0 * np.pi) * 8.0).astype(int) % 8
+        sector = np.floor(np.arctan2(y, x) / (2.0 * np.pi) * 8.0).astype(int) % 8
         bearing = len(np.unique(sector)) / 8.0
         return float(found[0]) * radius, normal, bearing
 
