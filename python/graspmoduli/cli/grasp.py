@@ -11,7 +11,14 @@ import typer
 from .. import _arrays, _signals
 from .._batches import NORMS, is_each
 from .console import check_outputs, number, progress_bar, warnings_said, write
-from .pipeline import find_grasps, image_of
+from .pipeline import (
+    Camera,
+    KeepTable,
+    ObjectNumber,
+    find_grasps,
+    image_of,
+    scan_options,
+)
 from .report import report
 from .table import show
 
@@ -21,7 +28,8 @@ def grasp(
         str,
         typer.Argument(
             metavar="OBJECT",
-            help="Mesh or point cloud (PLY OBJ STL GLB GLTF OFF PCD XYZ TXT NPY).",
+            help="Mesh or point cloud (PLY OBJ STL GLB GLTF OFF PCD XYZ TXT NPY), or a TOML file "
+            "that lists depth images or clouds of one object.",
         ),
     ],
     friction: Annotated[str, typer.Option(help="Coulomb friction coefficient μ > 0.")] = "1.0",
@@ -64,11 +72,14 @@ def grasp(
             metavar="E", help="Errors of aim, a distance: rank by the quality that they leave."
         ),
     ] = None,
+    camera: Camera = None,
+    object_number: ObjectNumber = None,
+    keep_table: KeepTable = False,
 ) -> None:
     """Find stable grasps of OBJECT, best first, in its own coordinates.
 
-    On a mesh fingertips are pressed on the mesh itself; a cloud of points is grasped on the surface
-    fitted to it.
+    On a mesh fingertips are pressed on the mesh itself; a cloud of points is grasped where it was
+    seen, and on the surface fitted to it where it was not.
     """
     mu = number("friction", friction, float)
     l = number("edges", edges, int)
@@ -89,17 +100,18 @@ def grasp(
     if center_of_mass is not None:
         center = [number("center_of_mass", text, float) for text in center_of_mass]
         options["center_of_mass"] = _arrays.floats("center_of_mass", center)
+    scan = scan_options(camera, object_number, keep_table)
     # Outputs that cannot be written are found out before the work; all are written at its end.
     check_outputs(thing, json=json_file, picture=picture)
     image = b""
     with progress_bar() as step, warnings_said():
-        found = find_grasps(thing, options, step)
+        found = find_grasps(thing, scan, options, step)
         if picture is not None:
             step("drawing", 0.85)
             image = image_of(picture, thing, found, mu, l)
-    _, fit, grasps = found
+    read, fit, grasps = found
     if json_file is not None:
-        text = json.dumps(report(thing, fit, grasps, mu, l, options["norm"]), indent=2) + "\n"
+        text = json.dumps(report(thing, *found, mu, l, options["norm"]), indent=2) + "\n"
         write(json_file, text.encode())
     if picture is not None:
         write(picture, image)
@@ -108,7 +120,7 @@ def grasp(
         if path is not None:
             print(f"wrote {path}")
     if not grasps:
-        _signals.say(_why_none(fit))
+        _signals.say(_why_none(fit, read))
         raise typer.Exit(1)
     if fit.mesh is not None and grasps[0].quality < WORTHLESS:
         _signals.say(
@@ -121,7 +133,12 @@ def grasp(
 WORTHLESS = 0.05
 
 
-def _why_none(fit: Any) -> str:
+def _why_none(fit: Any, read: Any) -> str:
+    if fit.mesh is None and read.table is not None:
+        return (
+            "no force-closure grasp found that fingers reach beside the table; more friction or a "
+            "view from another side may help, or --keep-table if that plane is no table"
+        )
     if fit.mesh is None:
         return "no force-closure grasp found; more friction or a fuller scan may help"
     return (

@@ -7,17 +7,46 @@ import logging
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
+
+from .. import _arrays
+from .console import number
+
+Camera = Annotated[
+    tuple[str, str, str] | None,
+    typer.Option(metavar="X Y Z", help="Where the camera was, in a cloud's own coordinates."),
+]
+ObjectNumber = Annotated[
+    str | None, typer.Option("--object", metavar="K", help="Which of several objects, from 1.")
+]
+KeepTable = Annotated[
+    bool, typer.Option("--keep-table", help="The plane of a scan belongs to the object.")
+]
+
+
+def scan_options(
+    camera: tuple[str, str, str] | None, object_number: str | None, keep_table: bool
+) -> dict[str, Any]:
+    """How to read an object, with the names that :func:`graspmoduli.fit` has for it."""
+    options: dict[str, Any] = {"keep_table": keep_table}
+    if camera is not None:
+        options["camera"] = [number("camera", text, float) for text in camera]
+    if object_number is not None:
+        value = number("object_number", object_number, int)
+        options["object_number"] = _arrays.count("object_number", value, 1)
+    return options
 
 
 def find_grasps(
-    path: str, options: dict[str, Any], step: Callable[[str, float], None]
+    path: str, scan: dict[str, Any], options: dict[str, Any], step: Callable[[str, float], None]
 ) -> tuple[Any, Any, Any]:
     """What was read, its fit, and its grasps."""
     step("reading", 0.0)
     from ..objects.reading import read
 
-    thing = read(path)
+    thing = read(path, **scan)
     step("fitting", 0.1)
     from ..objects.fitting import fit_object
 

@@ -11,7 +11,7 @@ SCHEMA = 1
 
 
 def report(
-    path: str, fit: Any, grasps: Any, friction: float, edges: int, norm: str
+    path: str, thing: Any, fit: Any, grasps: Any, friction: float, edges: int, norm: str
 ) -> dict[str, Any]:
     """The whole file, as docs/object.md describes it."""
     return {
@@ -25,6 +25,7 @@ def report(
             "unexplained": fit.unexplained,
             "pose": fit.pose.tolist(),
         },
+        "scan": _scan(thing),
         "friction": friction,
         "edges": edges,
         "norm": norm,
@@ -33,6 +34,19 @@ def report(
         "note": "contacts, normals and center_of_mass are in the coordinates of the object's "
         "file; quality is that of lengths divided by length_scale",
         "grasps": [_grasp_report(grasp) for grasp in grasps],
+    }
+
+
+def _scan(thing: Any) -> dict[str, Any] | None:
+    """From where a cloud of points was seen, and the table under it."""
+    if thing.faces is not None:
+        return None
+    table = thing.table
+    return {
+        "cameras": [(view.camera + 0.0).tolist() for view in thing.views],
+        "table": None
+        if table is None
+        else {"point": table.point.tolist(), "normal": table.normal.tolist()},
     }
 
 
@@ -56,13 +70,22 @@ def _grasp_report(grasp: Any) -> dict[str, Any]:
         "u": coordinates[0],
         "theta": coordinates[1],
     }
-    if grasp.checks is not None:
+    if grasp.exact_quality is not None:
         report["exact_quality"] = grasp.exact_quality
         report["low_quality"] = grasp.low_quality
         report["held"] = grasp.held
+    if grasp.checks is not None:
         report["checks"] = [
             # The fitted surface is the only part that is known.
-            {**dataclasses.asdict(check), "part": None if u is None else 0}
+            {**_known(dataclasses.asdict(check)), "part": None if u is None else 0}
             for check, u in zip(grasp.checks, coordinates[0], strict=True)
         ]
     return report
+
+
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    """Numbers that nobody knows as JSON has them."""
+    return {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in values.items()
+    }

@@ -70,6 +70,13 @@ def _words(fit: Any, grasps: Any) -> list[str]:
             f"most {angle:.0f}°, at least {bearing:.0%} of each pad bears, and {share} "
             "of the errors of aim that were tried leave a grasp in force closure."
         )
+    elif fit.scanned is not None:
+        seen = [sum(check.seen for check in grasp.checks) for grasp in grasps]
+        total = sum(len(grasp.checks) for grasp in grasps)
+        words.append(
+            f"{sum(seen)} of {total} contacts were seen, {seen[0]} of them of the first grasp; the "
+            "others lie on the fitted surface, where the object may be otherwise."
+        )
     return words
 
 

@@ -10,7 +10,7 @@ import typer
 from .. import _arrays
 from .._core import GraspModuliError
 from .console import check_outputs, number, progress_bar, warnings_said, write
-from .pipeline import find_grasps, image_of
+from .pipeline import Camera, KeepTable, ObjectNumber, find_grasps, image_of, scan_options
 
 
 def view(
@@ -33,6 +33,9 @@ def view(
     ] = None,
     friction: Annotated[str, typer.Option(help="Coulomb friction coefficient μ > 0.")] = "1.0",
     edges: Annotated[str, typer.Option(help="Edges l of the friction cones, at least 3.")] = "8",
+    camera: Camera = None,
+    object_number: ObjectNumber = None,
+    keep_table: KeepTable = False,
 ) -> None:
     """Look at OBJECT, its grasps and their friction cones in a browser, and move them."""
     mu, l = number("friction", friction, float), number("edges", edges, int)
@@ -43,12 +46,15 @@ def view(
     saved = html is not None or picture is not None
     if saved and thing is None:
         raise GraspModuliError("OBJECT must be given for html and picture, got none")
+    if thing is None and (camera is not None or object_number is not None):
+        raise GraspModuliError("OBJECT must be given for camera and object, got none")
     if shapes and thing is None:
         raise GraspModuliError(
             "OBJECT must be given for shapes, got none; without it they are shown"
         )
     if shapes and saved:
         raise GraspModuliError("shapes must be shown in a browser, got html or picture with it")
+    scan = scan_options(camera, object_number, keep_table)
     if thing is not None:
         check_outputs(thing, html=html, picture=picture)
     from ..viewing.browser import server as viewer
@@ -61,7 +67,7 @@ def view(
         server = viewer.serve_shapes(at)
     else:
         with progress_bar() as step, warnings_said():
-            found = find_grasps(thing, {"friction": mu, "edges": l}, step)
+            found = find_grasps(thing, scan, {"friction": mu, "edges": l}, step)
             if html is not None:
                 best = found[2][0] if found[2] else None
                 page = viewer.page_of(*found[:2], best, mu, l).encode()

@@ -32,15 +32,7 @@ from ..transfers import transfer
 from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
 from .reading import read
 from .scanned import Scanned
-from .touching import (
-    TIP,
-    Pressed,
-    Search,
-    TriangleMesh,
-    press,
-    search,
-    tip,
-)
+from .touching import TIP, Pressed, Search, TriangleMesh, press, search, tip
 from .walls import CLOSE, Booleans
 
 #: The version of the files that Fit.save writes.
@@ -151,9 +143,10 @@ class Fit(Value):
         there are such grasps. Contacts on points are then pressed on them.
 
         The order follows the proven bounds for round friction cones, ``round_quality``, or
-        ``low_quality`` if errors are given. Of a cloud it follows what is left of them with half
-        the friction, both on the points and on the fitted surface, and how many contacts were
-        seen. Qualities do not depend on the object's unit.
+        ``low_quality`` if errors are given. Of a cloud the first grasp is that of which most is
+        left with half the friction, on the points and on the fitted surface, and most was seen;
+        what promises more with less to go by is left out. Qualities do not depend on the object's
+        unit.
 
         Parameters
         ----------
@@ -264,8 +257,10 @@ class Fit(Value):
                 if pressed is not None and min(flat.quality, pressed.quality) > 0.0:
                     ranked.append((by_evidence(flat, pressed), pressed))
             if ranked:
-                ranked.sort(key=lambda pair: pair[0], reverse=True)
-                return [grasp for _, grasp in ranked[:top]]
+                first = max(ranked, key=lambda pair: pair[0])[1]
+                # Others may promise more, but with less to go by.
+                rest = [one for _, one in ranked if by_round_cones(one) <= by_round_cones(first)]
+                return sorted(rest, key=by_round_cones, reverse=True)[:top]
         return []
 
     def _pressed_on_points(

@@ -15,7 +15,7 @@ from .._arrays import Floats, count, finite, numbers
 from .._core import GraspModuliError
 from .captures import Capture, cameras, from_toml, merged, of_points
 from .files import from_file
-from .scans import Plane, cleaned, described, parts_of
+from .scans import Plane, cleaned, described, parts_of, unknown
 from .views import View
 
 #: Fewest points of a cloud from which an axis and a surface can be estimated.
@@ -318,9 +318,7 @@ def _single(
             described([samples[part == k] for k in objects], "of the area", len(samples))
         )
     if number is not None and number > max(len(objects), 1):
-        raise GraspModuliError(
-            f"object_number must be from 1 to {max(len(objects), 1)}, got {number}"
-        )
+        raise GraspModuliError(unknown(max(len(objects), 1), number))
     if len(objects) > 1 and number is not None:
         # A triangle belongs to the sample that is nearest.
         owner = part[tree.query(points[faces].mean(axis=1))[1]]

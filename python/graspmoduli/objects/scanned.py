@@ -20,8 +20,8 @@ AROUND = 0.4
 #: cos 40°: what a tip feels is about what the fitted surface has there.
 ALIKE = 0.766
 #: A contact is seen if points lie under this share of the pad, and if what it feels differs from
-#: the fitted surface by at most 20°, in radians: at an edge or a rim neither is to be trusted.
-PAD, SURE = 0.75, 0.349
+#: the fitted surface by at most 15°, in radians: at an edge or a rim neither is to be trusted.
+PAD, SURE = 0.75, 0.262
 #: Points in the way of a finger stop it, nearer than this to its middle, by the radius of its tip.
 IN_THE_WAY = 0.35
 #: So many points in the way are noise.

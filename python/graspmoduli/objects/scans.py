@@ -253,7 +253,7 @@ def cleaned(
         raise GraspModuliError(described(objects, "of the points", len(points)))
     chosen = 1 if number is None else number
     if chosen > len(objects):
-        raise GraspModuliError(f"object_number must be from 1 to {len(objects)}, got {number}")
+        raise GraspModuliError(unknown(len(objects), chosen))
     apart = float((owner < 0).mean())
     return Cleaned(objects[chosen - 1], table, flying, share, parts[chosen - 1], apart)
 
@@ -269,3 +269,8 @@ def described(objects: list[Floats], of: str, total: int) -> str:
         f"object must be a single one, got {len(objects)} with space between them ({found}); "
         "choose one by its object number"
     )
+
+
+def unknown(objects: int, number: int) -> str:
+    """What to say of a number that none of the objects has."""
+    return f"object_number must be at most {objects}, as many as were found, got {number}"

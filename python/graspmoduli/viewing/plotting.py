@@ -111,8 +111,8 @@ def plot_grasps(
         best = f"best grasp: $Q{prime}_{{{edges}}}$ = {grasps[0].quality:.4f}"
     figure.suptitle(f"{title}    {best}    (μ = {friction:g})".strip(), fontsize=13, y=0.965)
     handles = [
-        Line2D([], [], marker="o", linestyle="", color=color, label=f"finger {i + 1}")
-        for i, color in enumerate(FINGERS[:3])
+        Line2D([], [], marker="o", linestyle="", color=color, label=name)
+        for color, name in zip(FINGERS, _finger_names(grasps), strict=False)
     ]
     handles.append(
         Line2D([], [], marker="o", linestyle="", markeredgecolor="0.3", color="white",
@@ -127,6 +127,15 @@ def plot_grasps(
         bbox_to_anchor=(0.5, 0.0),
     )  # fmt: skip
     return figure
+
+
+def _finger_names(grasps: Sequence[ObjectGrasp]) -> list[str]:
+    """Names of the fingers of the first grasp, with what is not known from a scan."""
+    if not grasps:
+        return []
+    best = grasps[0]
+    seen = [check.seen for check in best.checks or ()] or [True] * len(best.contacts)
+    return [f"finger {i + 1}{'' if known else ', unseen'}" for i, known in enumerate(seen)]
 
 
 def plot_contact_map(fit: Fit, contacts: ContactMap, *, title: str = "") -> Figure:
