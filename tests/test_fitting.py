@@ -227,7 +227,7 @@ def cloud(n=500):
         (np.vstack([cloud(), [[np.nan, 0, 0]]]), "object must be finite, got nan at index"),
         (np.vstack([cloud(), [[np.inf, 0, 0]]]), "object must be finite, got inf at index"),
         (cloud()[:, :2], "points of shape \\(n, 3\\), got \\(500, 2\\)"),
-        (np.vstack([cloud() / 9, cloud() / 9 + [5, 0, 0]]), "a single one, got 2 parts"),
+        (np.vstack([cloud() / 9, cloud() / 9 + [5, 0, 0]]), "a single one, got 2 with space"),
         ((cloud(), np.zeros((0, 3), int)), "at least 4 points, got 0"),
         ((cloud(), [[0, 1, 700]]), "triangles among its 500 vertices, got vertex 700"),
         ("nowhere.ply", "a file that exists, got nowhere.ply"),

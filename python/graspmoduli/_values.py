@@ -38,12 +38,18 @@ class Value:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Equal values, or arrays of equal values of which NaN is one."""
+    """Equal values, of which NaN is one, or arrays of them."""
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f")
-    return bool(one == other)
+    return bool(one == other) or (_is_nan(one) and _is_nan(other))
 
 
 def hashable(value: Any) -> Any:
     """Equal arrays hash alike: 0.0 and -0.0 do, whatever their bits."""
+    if _is_nan(value):
+        return "NaN"
     return (value.shape, (value + 0.0).tobytes()) if isinstance(value, np.ndarray) else value
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and value != value

@@ -50,7 +50,7 @@ class ObjectGrasp(PlacedGrasp):
     round_quality: tuple[float, float] | None = None
     #: Coordinates of each contact on the fitted surface, NaN where it is not on it. Shape (m, 2).
     coordinates: Floats | None = field(default=None, repr=False)
-    #: What the mesh says of each contact, where there is one.
+    #: What the mesh or the points of a scan say of each contact.
     checks: tuple[ContactCheck, ...] | None = field(default=None, repr=False)
     #: Q_l with the normals of the mesh's own triangles where the contacts are.
     exact_quality: float | None = None

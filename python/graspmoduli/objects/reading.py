@@ -124,8 +124,8 @@ def _is_several(source: Any) -> bool:
     return (
         isinstance(source, list)
         and len(source) > 0
-        and all(isinstance(one, (str, os.PathLike)) or np.ndim(one) >= 2 for one in source)
-        and not (np.ndim(source[0]) == 2 and isinstance(source[0], list))
+        and all(isinstance(one, (str, os.PathLike, np.ndarray, tuple)) for one in source)
+        and all(getattr(one, "ndim", 2) >= 2 for one in source)
     )
 
 

@@ -19,9 +19,10 @@ DEPTH = 1.0
 AROUND = 0.4
 #: cos 40°: what a tip feels is about what the fitted surface has there.
 ALIKE = 0.766
-#: A contact is seen if points lie under this share of the pad, and if what it feels differs from
-#: the fitted surface by at most 15°, in radians: at an edge or a rim neither is to be trusted.
-PAD, SURE = 0.75, 0.262
+#: A contact is seen if points lie under this share of the pad, if what it feels differs from the
+#: fitted surface by at most 15°, in radians, and if its slope has a standard error of at most this:
+#: at an edge or a rim, or among much noise, it is not to be trusted.
+PAD, SURE, SLOPE = 0.75, 0.262, 0.1
 #: Points in the way of a finger stop it, nearer than this to its middle, by the radius of its tip.
 IN_THE_WAY = 0.35
 #: So many points in the way are noise.
@@ -101,18 +102,18 @@ class Scanned(Value):
         if felt is None:
             nothing = float("nan")
             return contact, way, ContactCheck(distance, nothing, False, clearance, nothing)
-        _, normal, bearing = felt
+        _, normal, bearing, error = felt
         point = contact + landing * way
         angle = float(np.arccos(min(1.0, float(normal @ way))))
-        seen = bearing >= PAD and angle <= SURE
+        seen = bearing >= PAD and angle <= SURE and error <= SLOPE
         # From the surface that is seen under the tip.
         return point, normal, ContactCheck(0.0, angle, seen, clearance, bearing)
 
     def _felt(
         self, away: Floats, along: Floats, beside: Floats, way: Floats, radius: float
-    ) -> tuple[float, Floats, float] | None:
-        """How much deeper a tip lands, the normal that it feels, and the share of the pad's eighths
-        that have points under them.
+    ) -> tuple[float, Floats, float, float] | None:
+        """How much deeper a tip lands, the normal that it feels, the share of the pad's eighths
+        that have points under them, and the standard error of the slope.
 
         By regression of the depth on the place under the tip, with one curvature for all
         directions: the slope is that of the pad's mean, the middle not that of a chord.
@@ -130,19 +131,23 @@ class Scanned(Value):
         design = np.stack([np.ones(len(x)), x, y, x * x + y * y], axis=1)
         weights = np.ones(len(x))
         found: Any = np.zeros(4)
+        error = np.zeros(len(x))
         for _ in range(4):
             root = np.sqrt(weights)[:, None]
             found = np.linalg.lstsq(root * design, root[:, 0] * depth, rcond=None)[0]
             error = np.abs(depth - design @ found)
             scale = max(3.0 * float(np.median(error)), 1e-3)
             weights = 1.0 / (1.0 + (error / scale) ** 2)
+        variance = float(weights @ (error * error) / weights.sum())
+        spread = np.linalg.pinv(design.T @ (weights[:, None] * design))
+        slope = float(np.sqrt(variance * (spread[1, 1] + spread[2, 2])))
         normal = way - found[1] * side - found[2] * other
         normal /= np.sqrt(normal @ normal)
         if abs(found[0]) > DEPTH or normal @ way < ALIKE:
             return None
         sector = np.floor(np.arctan2(y, x) / (2.0 * np.pi) * 8.0).astype(int) % 8
         bearing = len(np.unique(sector)) / 8.0
-        return float(found[0]) * radius, normal, bearing
+        return float(found[0]) * radius, normal, bearing, slope
 
 
 def _cells(sure: Booleans | None) -> Booleans:

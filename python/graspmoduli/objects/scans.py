@@ -26,7 +26,7 @@ ABOVE = 0.97
 SMALLEST_PART = 0.05
 #: Parts nearer than this, over the size of all, are one object; and, where one hides the other's
 #: end from the camera, nearer than that.
-GAP, HIDDEN_GAP = 0.08, 0.7
+GAP, HIDDEN_GAP = 0.08, 1.2
 
 
 class Plane(NamedTuple):

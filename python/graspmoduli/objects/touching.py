@@ -270,20 +270,22 @@ class Pressed(NamedTuple):
     low_quality: float
 
 
-@dataclass(frozen=True)
-class ContactCheck:
-    """What the mesh says of a contact of a grasp."""
+@dataclass(frozen=True, eq=False)
+class ContactCheck(Value):
+    """What the mesh, or the points of a scan, say of a contact of a grasp."""
 
-    #: From the nearest point of the object, in its unit.
+    #: From the nearest point of the object, in its unit; 0 where points lie under the tip.
     distance: float
-    #: Between the normal felt and that of the triangle at the contact [rad].
+    #: Between the normal felt and that of the triangle at the contact, or of the surface fitted to
+    #: a scan [rad]; NaN where no points lie under the tip.
     angle: float
-    #: Was the object seen there? Of a mesh, everywhere.
+    #: Was the object seen there? Of a mesh, everywhere; of a scan, where points lie under most of
+    #: the pad, and what they say of the normal is sure to 6° and within 15° of the fitted surface.
     seen: bool
     #: Radius, in the object's unit, about the way of the finger within which nothing stands in it:
     #: up to four tip radii are looked at.
     clearance: float
-    #: Share of the pad that bears.
+    #: Share of the pad that bears, or that has points under it; NaN where there are none.
     bearing: float
 
 

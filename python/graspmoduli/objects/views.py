@@ -17,7 +17,7 @@ BEFORE = 0.03
 #: How far before and behind a contact a finger's way is followed, and in which steps, by the size.
 AROUND_CONTACT, THROUGH, STEP = 0.05, 1.0, 0.01
 #: An organised cloud is the image of a pinhole if its points lie this close to their pixels.
-PINHOLE = 0.5
+PINHOLE = 0.25
 #: Most pixels from which a projection is found.
 MOST_PIXELS = 4_000
 #: Pixels around the image of a cloud that is not organised: what is beyond, nobody knows.
