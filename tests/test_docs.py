@@ -29,10 +29,11 @@ def run_blocks(path):
             ROOT / "README.md",
             *sorted({*(ROOT / "docs").glob("*.md")} - {ROOT / "docs/gradient.md"}),
         ],
-        named("paper.md", "cluster.md", "transfer.md", "object.md"),
+        named("paper.md", "cluster.md", "transfer.md", "object.md", "scan.md"),
     ),
     ids=lambda p: p.name,
 )
+@pytest.mark.filterwarnings("ignore:a table was found", "ignore:.* are flying pixels")
 def test_python_blocks_run(path, monkeypatch, tmp_path):
     # What they write stays out of the checkout; what they read is where it is there.
     (tmp_path / "examples").symlink_to(ROOT / "examples")

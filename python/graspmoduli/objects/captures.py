@@ -126,7 +126,8 @@ def _of_depth(folder: Path, table: dict[str, Any], pose: Floats) -> Capture:
     ahead = depth[chosen]
     local = np.stack([(column - cx) / fx * ahead, (row - cy) / fy * ahead, ahead], axis=1)
     view = of_depth(depth, (fx, fy, cx, cy), pose)
-    return Capture(local @ pose[:3, :3].T + pose[:3, 3], (view,), depth.size)
+    # Pixels without a depth are no news in a depth image.
+    return Capture(local @ pose[:3, :3].T + pose[:3, 3], (view,), len(local))
 
 
 def _image(path: Path, name: str) -> Any:
