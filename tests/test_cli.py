@@ -116,7 +116,7 @@ def bad_files(tmp_path):
         (["few.npy"], "at least 50 points"),
         (["flat.npy"], "on a plane"),
         (["wide.npy"], "points of shape (n, 3)"),
-        (["two.obj"], "a single one, got 2 parts"),
+        (["two.obj"], "a single one, got 2 with space"),
         (["."], "got the folder"),
         ([BOTTLE, "--friction", "0"], "friction must be a positive finite number, got 0.0"),
         ([BOTTLE, "--friction", "-1"], "friction must be"),

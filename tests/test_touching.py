@@ -301,14 +301,13 @@ class TestMesh:
         with pytest.raises(gm.GraspModuliError, match=sentence):
             fit.synthesize(**options)
 
-    def test_a_cloud_of_points_has_no_tips(self):
+    def test_a_cloud_of_points_has_three_hard_fingers(self):
         fit = quiet_fit(
             np.asarray(trimesh.sample.sample_surface(objects_made.bottle(), 3000, seed=0)[0])
         )
         assert fit.mesh is None
         assert fit.synthesize(top=1)
         several: list[dict[str, Any]] = [
-            {"tip_radius": 0.01},
             {"errors": 0.01},
             {"contacts": 4},
             {"torsion": 1.0},

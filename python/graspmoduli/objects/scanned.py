@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ PAD, SURE, SLOPE = 0.75, 0.262, 0.1
 IN_THE_WAY = 0.35
 #: So many points in the way are noise.
 NOISE = 2
+#: Neighbours that make a pad where points are few, and points of which that is asked.
+DOZEN, SOME = 13, 500
 #: Clearance is looked at up to so many radii.
 FARTHEST = 4.0
 
@@ -65,6 +68,16 @@ class Scanned(Value):
     def __repr__(self) -> str:
         return f"Scanned({len(self.points)} points, size {self.size:.4g})"
 
+    @cached_property
+    def spacing(self) -> float:
+        """Radius about a point within which there are a dozen others, where points are as dense as
+        in the middle of all."""
+        from scipy.spatial import KDTree
+
+        some = self.points[:: max(1, len(self.points) // SOME)]
+        distances: Any = KDTree(self.points).query(some, k=min(DOZEN, len(self.points)))[0]
+        return float(np.median(distances[:, -1]))
+
     def saved(self) -> dict[str, Any]:
         """Arrays for a file."""
         return {"points": self.points} | ({} if self.sure is None else {"sure": self.sure})
@@ -84,8 +97,9 @@ class Scanned(Value):
         """Where a tip lands that comes to a contact along a way, and what it feels.
 
         Where nothing was seen, the contact and its normal stay. None if something stands in the
-        way of the finger.
+        way of the finger. Among few points the tip is as large as it takes to meet a dozen.
         """
+        radius = max(radius, self.spacing)
         away = self.points - contact
         along = away @ way
         beside = np.sqrt(np.maximum((away * away).sum(axis=1) - along * along, 0.0))
