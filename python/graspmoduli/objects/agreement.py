@@ -6,6 +6,8 @@ hit.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .._arrays import Floats
@@ -21,6 +23,28 @@ VISIBLE = 3e-3
 GRID = (40, 60)
 
 
+@dataclass(frozen=True)
+class Residual:
+    """Distance of the object's outer wall from the fitted surface, where it explains the wall."""
+
+    #: Root mean square, in the unit of the object.
+    rms: float
+    #: Largest, in the unit of the object.
+    max: float
+    #: The object's largest extent, in its unit.
+    size: float
+
+    @property
+    def relative_rms(self) -> float:
+        """rms / size."""
+        return self.rms / self.size
+
+    @property
+    def relative_max(self) -> float:
+        """max / size."""
+        return self.max / self.size
+
+
 def visible(thing: Object, mesh: TriangleMesh) -> Booleans:
     """Which of the object's samples a straight ray along their normals sees from outside."""
     points = mesh.local(thing.samples)
@@ -33,14 +57,20 @@ def visible(thing: Object, mesh: TriangleMesh) -> Booleans:
 
 
 def unexplained_area(thing: Object, mesh: TriangleMesh, surface: Surface, pose: Floats) -> float:
-    """Share of the object's visible area farther than 2 % of its size from the surface.
-
-    The surface is taken as closed by a lid at either end.
-    """
+    """Share of the object's visible area farther than 2 % of its size from the surface."""
     seen = visible(thing, mesh)
     if not seen.any():
         return 1.0
-    local = (thing.samples[seen] - pose[:3, 3]) @ pose[:3, :3]
+    away = distances(thing.samples[seen], surface, pose)
+    return float((away > CLOSE * thing.size).mean())
+
+
+def distances(points: Floats, surface: Surface, pose: Floats) -> Floats:
+    """From points, in the object's coordinates, to a surface closed by a lid at either end.
+
+    To first order, and not less than it is. Shape (n,).
+    """
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
     radius = np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2)
     theta = arctan2(np.ascontiguousarray(local[:, 1]), np.ascontiguousarray(local[:, 0]))
     height = local[:, 2]
@@ -51,8 +81,7 @@ def unexplained_area(thing: Object, mesh: TriangleMesh, surface: Surface, pose: 
     off = radius - surface.radius(u, theta)
     to_wall = np.sqrt((off * slant) ** 2 + beyond**2)
     to_end = np.minimum(np.abs(height - surface.bottom), np.abs(height - surface.top))
-    nearest = np.minimum(to_wall, np.sqrt(to_end**2 + np.maximum(off, 0.0) ** 2))
-    return float((nearest > CLOSE * thing.size).mean())
+    return np.minimum(to_wall, np.sqrt(to_end**2 + np.maximum(off, 0.0) ** 2))
 
 
 def phantom_area(mesh: TriangleMesh, surface: Surface, pose: Floats) -> float:

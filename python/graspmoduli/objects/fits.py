@@ -29,6 +29,7 @@ from ..quality import circular_quality, quality
 from ..surfaces import Surface
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
+from .agreement import Residual as Residual
 from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
 from .reading import read
 from .scanned import Scanned
@@ -39,28 +40,6 @@ from .walls import CLOSE, Booleans
 FILE_VERSION = 2
 #: Grasps of a mesh of lower quality are force closure, but hold nothing.
 LEAST = 1e-3
-
-
-@dataclass(frozen=True)
-class Residual:
-    """Distance of the object's outer wall from the fitted surface, where it explains the wall."""
-
-    #: Root mean square, in the unit of the object.
-    rms: float
-    #: Largest, in the unit of the object.
-    max: float
-    #: The object's largest extent, in its unit.
-    size: float
-
-    @property
-    def relative_rms(self) -> float:
-        """rms / size."""
-        return self.rms / self.size
-
-    @property
-    def relative_max(self) -> float:
-        """max / size."""
-        return self.max / self.size
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +60,8 @@ class Fit(Value):
     #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
     #: Shape (k, n).
     allowed: Booleans = field(repr=False)
+    #: Is it one part of several (:func:`fit_parts`)? Its grasps then lie on its surface.
+    part: bool = False
     #: The object's mesh, where it came as one: grasps are pressed on it.
     mesh: TriangleMesh | None = None
     #: The object's points, where it came as a cloud: contacts that were seen are pressed on them.
@@ -182,11 +163,18 @@ class Fit(Value):
         radius = tip(self.mesh, tip_radius)
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
         wanted = Search(hand, center, self.length_scale, size, many, aim)
-        found = search(self.mesh, radius, start, wanted)
+        found = search(self.mesh, radius, start, wanted, self._is_on if self.part else None)
         grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
+        if self.part:
+            # Those that climbed off it are grasps of another part.
+            grasps = [one for one in grasps if one.grasp is not None]
         # Equal ones stay in the order of their Q_l.
         key = by_round_cones if errors is None else by_errors
         return sorted(grasps, key=key, reverse=True)[:many]
+
+    def _is_on(self, points: Floats) -> Booleans:
+        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
+        return self.surface.coordinates(local)[2] <= CLOSE * self.residual.size
 
     def _center(self, center_of_mass: ArrayLike | None) -> Floats:
         if center_of_mass is None:
@@ -446,6 +434,7 @@ class Fit(Value):
                 residual=[self.residual.rms, self.residual.max, self.residual.size],
                 shares=[self.coverage, self.unexplained],
                 allowed=self.allowed,
+                part=self.part,
                 **({} if self.mesh is None else self.mesh.saved()),
                 **({} if self.scanned is None else self.scanned.saved()),
             )
@@ -468,6 +457,7 @@ class Fit(Value):
                         coverage=coverage,
                         unexplained=unexplained,
                         allowed=data["allowed"].astype(bool, casting="no"),
+                        part="part" in data and bool(data["part"]),
                         mesh=TriangleMesh.loaded(data, residual.size),
                         scanned=Scanned.loaded(data, residual.size),
                     )

@@ -115,10 +115,11 @@ def _fitted(thing: Object, progress: Callable[[int, int], object] | None, stackl
         raise GraspModuliError(
             "object must have an outer wall around some axis, got too little of one"
         )
-    return _fit_about(thing, axis, stacklevel + 1)
+    return fit_about(thing, axis, stacklevel + 1)
 
 
-def _fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
+def fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
+    """The fit about a given axis; ``stacklevel``, from here, is that of whom warnings are for."""
     mesh = thing.faces is not None
     hits, grid = fine_hits(thing, axis)
     coarse, _ = regress(thing, hits, grid, intervals=10, columns=8)

@@ -158,7 +158,7 @@ def _of_cloud(
     _check_count(found.points)
     array = _some(found.points, MOST_POINTS)
     samples, normals = _cloud_samples(array)
-    return Object(array, None, samples, normals, _size(array, samples), views, found.table)
+    return Object(array, None, samples, normals, size_of(array, samples), views, found.table)
 
 
 def _some(points: Floats, most: int) -> Floats:
@@ -198,15 +198,15 @@ def _of_mesh(points: Any, faces: Any, number: int | None, notes: list[str]) -> O
         raise GraspModuliError(f"object must have at least 4 points, got {len(array)}")
     _check_extent(array)
     _check_solid(array)
-    samples, normals = _mesh_samples(array, triangles)
+    samples, normals = mesh_samples(array, triangles)
     chosen = _single(array, triangles, samples, number, notes)
     if chosen is not None:
         array, triangles = _used(array, chosen)
-        samples, normals = _mesh_samples(array, triangles)
-    return Object(array, triangles, samples, normals, _size(array, samples))
+        samples, normals = mesh_samples(array, triangles)
+    return Object(array, triangles, samples, normals, size_of(array, samples))
 
 
-def _size(points: Floats, samples: Floats) -> float:
+def size_of(points: Floats, samples: Floats) -> float:
     """The largest extent along the principal axes of the samples."""
     axes = np.linalg.svd(samples - samples.mean(axis=0), full_matrices=False)[2]
     return float(np.ptp(points @ axes.T, axis=0).max())
@@ -243,7 +243,9 @@ def _check_solid(points: Floats) -> None:
         raise GraspModuliError("object must be solid, got all points on a plane")
 
 
-def _mesh_samples(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def mesh_samples(
+    points: Floats, faces: NDArray[np.int64], count: int = SAMPLES
+) -> tuple[Floats, Floats]:
     """Points spread over a mesh by area, the same ones every time."""
     corners = points[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -260,9 +262,9 @@ def _mesh_samples(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Flo
         )
     random = np.random.Generator(np.random.Philox(0))
     shares = np.cumsum(doubled) / doubled.sum()
-    strata = (np.arange(SAMPLES) + random.random(SAMPLES)) / SAMPLES
+    strata = (np.arange(count) + random.random(count)) / count
     chosen = np.minimum(np.searchsorted(shares, strata), len(faces) - 1)
-    a, b = random.random((2, SAMPLES, 1))
+    a, b = random.random((2, count, 1))
     fold = a + b > 1.0
     a, b = np.where(fold, 1.0 - a, a), np.where(fold, 1.0 - b, b)
     triangle = corners[chosen]
@@ -308,7 +310,7 @@ def _single(
 
     tree = KDTree(samples)
     distances: Any = tree.query(samples, k=2)[0]
-    size = _size(points, samples)
+    size = size_of(points, samples)
     part = parts_of(tree, max(GAP_IN_MESH * size, 4.0 * float(np.median(distances[:, 1]))))
     shares = np.bincount(part) / len(samples)
     order = np.argsort(-shares, kind="stable")

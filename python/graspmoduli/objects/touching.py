@@ -5,6 +5,7 @@ The kernels are in ``crates/graspmoduli/src/touch``; they see the mesh at size 1
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -25,6 +26,8 @@ TIP = 0.05
 LARGEST_TIP, SMALLEST_TIP = 0.25, 1e-4
 #: Samples of a mesh at which tips are pressed.
 SAMPLES = 1_000
+#: If only a part of it is to be grasped.
+OF_A_PART = 4_000
 #: Of any two grasps at least one contact differs by this share of the object's radius.
 APART = 0.15
 #: Rows of the kernels: a place's point, normal, share of the pad that is off, that bears, steady.
@@ -302,9 +305,24 @@ class Search(NamedTuple):
     errors: float
 
 
-def search(mesh: TriangleMesh, radius: float, seed: int, wanted: Search) -> list[Pressed]:
-    """Different grasps of the mesh, true ones by exact normals, by balls and under bad aim."""
-    rows = places(mesh, radius, seed)
+def search(
+    mesh: TriangleMesh,
+    radius: float,
+    seed: int,
+    wanted: Search,
+    within: Callable[[Floats], NDArray[np.bool_]] | None = None,
+) -> list[Pressed]:
+    """Different grasps of the mesh, true ones by exact normals, by balls and under bad aim.
+
+    Fingers start where ``within`` is true of their contacts, if it is given.
+    """
+    if within is None:
+        rows = places(mesh, radius, seed)
+    else:
+        rows = places(mesh, radius, seed, OF_A_PART)
+        rows = np.ascontiguousarray(rows[within(mesh.back(rows[:, POINT]))][:SAMPLES])
+    if len(rows) < wanted.contacts:
+        return []
     found = mesh.core.grasps(radius, rows, _request(mesh, wanted), cores())
     return [_pressed(mesh, one) for one in found]
 
