@@ -24,7 +24,6 @@ from graspmoduli.objects.walls import (
     Shape,
     _cloud_hits,
     _design,
-    _lower_band,
     _mesh_hits,
     _penalty,
     outer_wall,
@@ -162,15 +161,18 @@ def test_the_regression_is_least_squares():
     intervals, columns, rng = 6, 7, np.random.default_rng(3)
     u, theta = rng.random(400), rng.uniform(0, 2 * np.pi, 400)
     radius = 1.0 + 0.2 * np.sin(theta) * u
-    design = _design(u, theta, intervals, columns).tocsr()
-    band = _lower_band(design.T @ design, columns) + _penalty(intervals, columns, FOR_SCANS)
-    found = _core.solve_banded(band, design.T @ radius)
-    wanted = np.linalg.solve(dense(band, columns), design.T @ radius)
-    np.testing.assert_allclose(found, wanted, rtol=1e-9)
-    full = design.toarray()
+    design = _design(u, theta, intervals, columns)
+    full = np.zeros((400, (intervals + 3) * columns))
+    full[np.arange(400)[:, None], design.cells] = design.values
+    weights = np.maximum(rng.random(400) - 0.2, 0.0)
+    band, right = _core.normal_equations(full.shape[1], 4 * columns, *design, weights, radius)
     np.testing.assert_allclose(
-        dense(_lower_band(design.T @ design, columns), columns), full.T @ full, atol=1e-13
+        dense(band, columns), full.T @ (weights[:, None] * full), atol=1e-13
     )
+    np.testing.assert_allclose(right, full.T @ (weights * radius), atol=1e-13)
+    band += _penalty(intervals, columns, FOR_SCANS)
+    found = _core.solve_banded(band, right)
+    np.testing.assert_allclose(found, np.linalg.solve(dense(band, columns), right), rtol=1e-9)
     # And the design is the surface: the values of the spline with these coefficients.
     shape = Shape(found.reshape(intervals + 3, columns))
     hits = Hits(u, theta, radius, np.zeros(400, np.int64), np.zeros(400))

@@ -15,7 +15,7 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
                        :func:`transfer_bound`, :func:`epsilon`
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
-real objects           :func:`fit`, :func:`contact_map`
+real objects           :func:`fit`, :func:`fit_parts`, :func:`contact_map`
 errors                 :class:`GraspModuliError`, :class:`MissingExtraError`
 =====================  ======================================================================
 
@@ -55,6 +55,8 @@ from .objects.fitting import Fit as Fit
 from .objects.fitting import ObjectGrasp as ObjectGrasp
 from .objects.fitting import Residual as Residual
 from .objects.fitting import fit as fit
+from .objects.parts import Parts as Parts
+from .objects.parts import fit_parts as fit_parts
 from .objects.touching import ContactCheck as ContactCheck
 from .objects.touching import ContactMap as ContactMap
 from .objects.touching import contact_map as contact_map

@@ -80,7 +80,9 @@ mod _core {
         fill_configurations, fill_nearby, grasps_near, random_grasps, smallest_nearby, survey,
     };
     #[pymodule_export]
-    use super::math::{arctan2, cos, exp, instructions, interpolate, power, sin, solve_banded};
+    use super::math::{
+        arctan2, cos, exp, instructions, interpolate, normal_equations, power, sin, solve_banded,
+    };
     #[pymodule_export]
     use super::moduli::{PyDeformation, surface_distance, transfer_bound};
     #[pymodule_export]

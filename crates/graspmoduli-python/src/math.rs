@@ -55,6 +55,30 @@ pub fn interpolate<'py>(
     found.into_pyarray(py).reshape(shape)
 }
 
+/// The lower band and the right-hand side of a regression's normal equations.
+///
+/// `cells` and `design` have a row of 16 for each point.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub fn normal_equations<'py>(
+    py: Python<'py>,
+    count: usize,
+    stride: usize,
+    cells: PyReadonlyArray2<'py, u32>,
+    design: PyReadonlyArray2<'py, f64>,
+    weights: PyReadonlyArray1<'py, f64>,
+    values: PyReadonlyArray1<'py, f64>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let (cells, design) = (cells.as_slice()?, design.as_slice()?);
+    let (weights, values) = (weights.as_slice()?, values.as_slice()?);
+    let (band, right) = py
+        .detach(|| interpolation::normal_equations(count, stride, cells, design, weights, values));
+    Ok((
+        band.into_pyarray(py).reshape([count, stride])?,
+        right.into_pyarray(py),
+    ))
+}
+
 /// The solution of a symmetric positive system, given by its lower band: a row per unknown.
 #[pyfunction]
 pub fn solve_banded<'py>(

@@ -106,6 +106,41 @@ fn interpolate_around(values: &mut [f64]) {
     values.rotate_right(1);
 }
 
+/// The normal equations of a regression, as [`solve_banded`] takes them: the lower band of
+/// Σ w f fᵀ, of rows of `stride` entries, and Σ w y f.
+///
+/// Point i has weight `weights[i]`, value `values[i]` and, of the 16 functions `cells[16 i..]`, the
+/// values `design[16 i..]`. Two functions that meet are less than `stride` apart.
+pub fn normal_equations(
+    count: usize,
+    stride: usize,
+    cells: &[u32],
+    design: &[f64],
+    weights: &[f64],
+    values: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let (mut band, mut right) = (vec![0.0; count * stride], vec![0.0; count]);
+    let (cells, _) = cells.as_chunks::<16>();
+    let (design, _) = design.as_chunks::<16>();
+    for (((cells, design), &weight), &value) in cells.iter().zip(design).zip(weights).zip(values) {
+        if weight == 0.0 {
+            continue;
+        }
+        for (&row, &f) in cells.iter().zip(design) {
+            let (row, scaled) = (row as usize, weight * f);
+            right[row] += scaled * value;
+            let own = &mut band[row * stride..][..stride];
+            for (&column, &g) in cells.iter().zip(design) {
+                let column = column as usize;
+                if column <= row {
+                    own[column + stride - 1 - row] += scaled * g;
+                }
+            }
+        }
+    }
+    (band, right)
+}
+
 /// The solution of a symmetric positive definite system, by Cholesky's factorisation; None if the
 /// matrix is not positive.
 ///

@@ -21,7 +21,7 @@ from .._arrays import (
     vectors,
 )
 from .._batches import NORMS, Cone, evaluated_with, fingers
-from .._core import GraspModuliError
+from .._core import GraspModuliError, arctan2
 from .._files import replacing
 from .._values import Value
 from ..grasps import Grasp, PlacedGrasp, a_grasp
@@ -30,6 +30,8 @@ from ..surfaces import Surface
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
 from .agreement import Residual as Residual
+from .agreement import distances
+from .likeness import cells, ways
 from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
 from .reading import read
 from .scanned import Scanned
@@ -167,14 +169,21 @@ class Fit(Value):
         grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
         if self.part:
             # Those that climbed off it are grasps of another part.
-            grasps = [one for one in grasps if one.grasp is not None]
+            grasps = [one for one in grasps if self._is_on(one.contacts).all()]
         # Equal ones stay in the order of their Q_l.
         key = by_round_cones if errors is None else by_errors
         return sorted(grasps, key=key, reverse=True)[:many]
 
     def _is_on(self, points: Floats) -> Booleans:
+        """Do points, in the object's coordinates, lie on the part?"""
+        near = distances(points, self.surface, self.pose) <= CLOSE * self.residual.size
         local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-        return self.surface.coordinates(local)[2] <= CLOSE * self.residual.size
+        rows, columns = self.allowed.shape
+        u = (local[:, 2] - self.surface.bottom) / (self.surface.top - self.surface.bottom)
+        angle = arctan2(np.ascontiguousarray(local[:, 1]), np.ascontiguousarray(local[:, 0]))
+        row = np.clip((u * rows).astype(np.int64), 0, rows - 1)
+        column = np.floor(angle / (2 * np.pi) * columns).astype(np.int64) % columns
+        return near & self.allowed[row, column]
 
     def _center(self, center_of_mass: ArrayLike | None) -> Floats:
         if center_of_mass is None:
@@ -348,7 +357,9 @@ class Fit(Value):
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
         if isinstance(grasp, ObjectGrasp):
-            grasp = self.on_surface(grasp)
+            placed, grasp = grasp, self.on_surface(grasp)
+        else:
+            placed = self.in_object(grasp, friction=friction, edges=edges)
         start, end = self.unit_surface, target.unit_surface
         allowed = target.allowed if method == "ascent" else None
         carried = transfer(
@@ -360,14 +371,34 @@ class Fit(Value):
         hand = fingers(friction, edges, len(grasp))
         aim = 0.5 * TIP * target.mesh.size
         wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
-        pressed = press(target.mesh, TIP, arrived.contacts, arrived.normals, wanted)
-        if pressed is None:
+        starts = [(arrived.contacts, arrived.normals)]
+        if self.part and target.part:
+            starts += self._laid_on(target, placed)
+        found = []
+        for contacts, normals in starts:
+            pressed = press(target.mesh, TIP, contacts, normals, wanted)
+            if pressed is not None:
+                found += target._touched([pressed], wanted)
+        # On a part, grasps that stay on it come first.
+        if target.part:
+            found.sort(key=lambda one: int(target._is_on(one.contacts).sum()), reverse=True)
+        if not found:
             raise GraspModuliError(
                 "grasp must be one that the target's mesh can be grasped with, got contacts that "
                 f"no tip reaches or that lose force closure there (on its surface Q is "
                 f"{arrived.quality:.3g})"
             )
-        return target._touched([pressed], wanted)[0]
+        return found[0]
+
+    def _laid_on(self, target: Fit, grasp: ObjectGrasp) -> list[tuple[Floats, Floats]]:
+        """Contacts and normals of a grasp with this part laid on another that is like it."""
+        here, there = (cells(fit.surface, fit.pose, fit.allowed) for fit in (self, target))
+        found = []
+        for matrix, offset in ways(here, there):
+            normals = np.linalg.solve(matrix.T, grasp.normals.T).T
+            normals /= np.sqrt((normals * normals).sum(axis=1, keepdims=True))
+            found.append((grasp.contacts @ matrix.T + offset, normals))
+        return found
 
     def _touched(self, found: list[Pressed], wanted: Search) -> list[ObjectGrasp]:
         """Grasps pressed on the mesh, with coordinates on the surface where they lie there."""

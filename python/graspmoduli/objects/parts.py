@@ -18,6 +18,7 @@ from .agreement import Residual, distances, phantom_area, visible
 from .axes import candidate_axes, refined, same_axis, score
 from .fits import Fit
 from .fitting import fit_about, fit_object
+from .likeness import cells
 from .reading import Object, mesh_samples, read, size_of
 from .scans import parts_of
 from .touching import TriangleMesh
@@ -63,7 +64,7 @@ class Parts(Value):
         return np.bincount(known, minlength=len(self.parts)) / len(self.part)
 
     def part_of(self, points: Any) -> NDArray[np.int64]:
-        """The part that is nearest to each point, -1 where none is within 2 % of the size.
+        """The first part within 2 % of the size of each point, -1 where there is none.
 
         Parameters
         ----------
@@ -71,7 +72,7 @@ class Parts(Value):
             In the object's coordinates. Shape (..., 3); the result has shape (...).
         """
         given = vectors("points", points, "(..., 3)")
-        return _nearest(self.parts, given.reshape(-1, 3)).reshape(given.shape[:-1])
+        return _first(self.parts, given.reshape(-1, 3)).reshape(given.shape[:-1])
 
 
 def fit_parts(
@@ -119,8 +120,8 @@ def fit_parts(
         # That one wall does not explain all is why there are parts.
         warnings.simplefilter("ignore", UserWarning)
         first = fit_object(thing)
-        parts = [_as_part(first, body, points)]
         left = distances(points, first.surface, first.pose) > CLOSE * thing.size
+        parts = [_as_part(first, body, points, ~left)]
         given_up = np.zeros(len(points), dtype=np.bool_)
         near = _spacing(points)
         while left.mean() > 1.0 - ENOUGH and len(parts) < MOST_PARTS:
@@ -135,11 +136,11 @@ def fit_parts(
                 given_up[rest[piece]] = True
                 continue
             one, explained = found
+            parts.append(_as_part(one, body, points, left & explained))
             left &= ~explained
-            parts.append(_as_part(one, body, points))
     if progress is not None:
         progress(100, 100)
-    owner = _nearest(tuple(parts), points)
+    owner = _first(tuple(parts), points)
     return Parts(
         parts=tuple(parts),
         unexplained=float((owner < 0).mean()),
@@ -224,38 +225,34 @@ def _is_flat(thing: Object, axis: Axis) -> bool:
     return bool(height.max() - height.min() < FLAT * thing.size)
 
 
-def _as_part(fit: Fit, body: TriangleMesh, points: Floats) -> Fit:
-    """A fit of a piece as a part of the whole object."""
-    away = distances(points, fit.surface, fit.pose)
-    explained = away[away <= CLOSE * body.size]
-    rows, columns = fit.allowed.shape
-    u, theta = np.meshgrid(
-        (np.arange(rows) + 0.5) / rows,
-        (np.arange(columns) + 0.5) * 2 * np.pi / columns,
-        indexing="ij",
-    )
-    cells = fit.to_object(fit.surface.points(u, theta)).reshape(-1, 3)
-    local = body.local(cells)
-    apart = body.core.nearest(local) - local
-    there = ((apart * apart).sum(axis=1) <= CLOSE**2).reshape(rows, columns)
+def _as_part(fit: Fit, body: TriangleMesh, points: Floats, own: Booleans) -> Fit:
+    """A fit of a piece as a part of the whole object, to which some of the points belong."""
+    from scipy.spatial import KDTree
+
+    away = distances(points[own], fit.surface, fit.pose)
+    places, _ = cells(fit.surface, fit.pose, np.ones_like(fit.allowed))
+    near: Any = KDTree(points[own]).query(places)[0]
+    there = (near <= 1.5 * CLOSE * body.size).reshape(fit.allowed.shape)
     return Fit(
         surface=fit.surface,
         pose=fit.pose,
         residual=Residual(
-            rms=float(np.sqrt((explained * explained).mean())) if len(explained) else 0.0,
-            max=float(explained.max()) if len(explained) else 0.0,
+            rms=float(np.sqrt((away * away).mean())),
+            max=float(away.max()),
             size=body.size,
         ),
         coverage=1.0 - phantom_area(body, fit.surface, fit.pose),
-        unexplained=1.0 - len(explained) / len(points),
+        unexplained=1.0 - float(own.mean()),
         allowed=there,
         part=True,
         mesh=body,
     )
 
 
-def _nearest(parts: tuple[Fit, ...], points: Floats) -> NDArray[np.int64]:
-    away = np.stack([distances(points, one.surface, one.pose) for one in parts])
-    nearest = away.argmin(axis=0)
-    close = away[nearest, np.arange(len(points))] <= CLOSE * parts[0].residual.size
-    return np.where(close, nearest, -1)
+def _first(parts: tuple[Fit, ...], points: Floats) -> NDArray[np.int64]:
+    """The first part that explains each point, -1 if none does."""
+    owner = np.full(len(points), -1, dtype=np.int64)
+    for number, one in enumerate(parts):
+        away = distances(points, one.surface, one.pose)
+        owner[(owner < 0) & (away <= CLOSE * one.residual.size)] = number
+    return owner

@@ -9,13 +9,14 @@ differ between processors, as do NumPy's sines; those of the core do neither.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Floats
-from .._core import GraspModuliError, arctan2, cos, sin, solve_banded
+from .._arrays import Floats, locked
+from .._core import GraspModuliError, arctan2, cos, normal_equations, sin, solve_banded
 from ..splines import clamped_knots
 from ..surfaces import Surface
 from .reading import Object
@@ -259,10 +260,8 @@ def regress(
     nearest if none is close: so the body wins over a handle in front of it, and the outer wall
     over the inner one.
     """
-    from scipy.sparse import csr_array
-
     u = np.clip((hits.height - grid.low) / (grid.high - grid.low), 0.0, 1.0)
-    design: Any = csr_array(_design(u, hits.angle, intervals, columns))
+    design = _design(u, hits.angle, intervals, columns)
     close = CLOSE * thing.size
     if start is None:
         chosen = outermost(hits, grid)
@@ -278,11 +277,12 @@ def regress(
         per_cell = np.bincount(hits.cell, weights, grid.rows * grid.columns)
         # Every cell counts the same, however many points it holds.
         balanced = weights / np.maximum(per_cell[hits.cell], 1.0)
-        weighted = design.multiply(balanced[:, None]).tocsr()
-        normal = _lower_band(design.T @ weighted, columns)
+        normal, right = normal_equations(
+            (intervals + 3) * columns, 4 * columns, *design, balanced, hits.radius
+        )
         normal += stiff if start is None and round_ < 2 else soft
-        coefficients = solve_banded(normal, weighted.T @ hits.radius)
-        error = hits.radius - design @ coefficients
+        coefficients = solve_banded(normal, right)
+        error = hits.radius - (design.values * coefficients[design.cells]).sum(axis=1)
         chosen = outer_wall(hits, grid, error, close)
         if round_ == 0 and start is None:
             # The first surface is a compromise with whatever sticks out: only shrink from it.
@@ -311,22 +311,26 @@ def outer_wall(hits: Hits, grid: Grid, error: Floats, close: float) -> Booleans:
     return np.abs(hits.radius - wall[hits.cell]) <= 0.5 * close
 
 
-def _design(u: Floats, theta: Floats, intervals: int, columns: int) -> Any:
-    """The value of each basis function at each point. Sparse, shape (n, rows · columns)."""
-    from scipy.interpolate import BSpline
-    from scipy.sparse import coo_array
+class _Design(NamedTuple):
+    """The functions that do not vanish at each point, and their values there. Shapes (n, 16)."""
 
-    in_u = BSpline.design_matrix(u, clamped_knots(intervals), 3)
+    cells: NDArray[np.uint32]
+    values: Floats
+
+
+def _design(u: Floats, theta: Floats, intervals: int, columns: int) -> _Design:
+    """The basis functions of a spline surface at points."""
+    from scipy.interpolate import BSpline
+
+    in_u: Any = BSpline.design_matrix(u, clamped_knots(intervals), 3)
     uniform = np.arange(-3, columns + 4, dtype=np.float64)
     turns = np.clip(theta / (2 * np.pi) * columns, 0.0, np.nextafter(columns, 0.0))
-    in_theta = BSpline.design_matrix(turns, uniform, 3)
+    in_theta: Any = BSpline.design_matrix(turns, uniform, 3)
     count = len(u)
     rows = in_u.indices.reshape(count, 4)
     cells = rows[:, :, None] * columns + (in_theta.indices.reshape(count, 4) % columns)[:, None, :]
     values = in_u.data.reshape(count, 4)[:, :, None] * in_theta.data.reshape(count, 4)[:, None, :]
-    owner = np.repeat(np.arange(count), 16)
-    shape = (count, (intervals + 3) * columns)
-    return coo_array((values.ravel(), (owner, cells.ravel())), shape=shape)
+    return _Design(cells.reshape(count, 16).astype(np.uint32), values.reshape(count, 16))
 
 
 def _lower_band(matrix: Any, columns: int) -> Floats:
@@ -342,6 +346,7 @@ def _lower_band(matrix: Any, columns: int) -> Floats:
     return band
 
 
+@cache
 def _penalty(intervals: int, columns: int, smoothing: Smoothing) -> Floats:
     """Roughness of the coefficients: second differences both ways, and first ones around.
 
@@ -362,4 +367,4 @@ def _penalty(intervals: int, columns: int, smoothing: Smoothing) -> Floats:
     across = kron(csr_array(np.eye(rows)), rings)
     band = _lower_band(csr_array(along + across), columns)
     band[:, -1] += 1e-9
-    return band
+    return locked(band)

@@ -6,24 +6,21 @@ Every function returns a :class:`matplotlib.figure.Figure`: ``plot_surface(S).sa
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle, pairwise
+from itertools import cycle
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from .._arrays import Floats, count, floats
-from .._batches import contact_frames
 from .._core import GraspModuliError
 from ..grasps import Grasp, place
 from ..moduli import Point, interpolate, sample_weights
 from ..objects.fitting import Fit, ObjectGrasp
 from ..objects.reading import Object
-from ..objects.touching import ContactMap
 from ..quality import quality
 from ..surfaces import Surface, combine
 from ..transfers import QualityAlong, Transfer
@@ -136,41 +133,6 @@ def _finger_names(grasps: Sequence[ObjectGrasp]) -> list[str]:
     best = grasps[0]
     seen = [check.seen for check in best.checks or ()] or [True] * len(best.contacts)
     return [f"finger {i + 1}{'' if known else ', unseen'}" for i, known in enumerate(seen)]
-
-
-def plot_contact_map(fit: Fit, contacts: ContactMap, *, title: str = "") -> Figure:
-    """Where fingertips may press on an object's mesh, from two sides: a disc for each place.
-
-    Its colour is how much of the pad bears, from dark, a fifth or less, to light, the whole of it.
-    """
-    if fit.mesh is None:
-        raise GraspModuliError("fit must be that of a mesh, got a cloud of points")
-    figure = Figure(figsize=(8.4, 5.0), dpi=150, facecolor="white")
-    rotation, origin = fit.pose[:3, :3], fit.pose[:3, 3]
-    points, normals = (contacts.contacts - origin) @ rotation, contacts.normals @ rotation
-    shades = colormaps["viridis"]((np.clip(contacts.bearing, 0.2, 1.0) - 0.2) / 0.8)
-    frames = contact_frames(points, normals)
-    turns = 2 * np.pi * np.arange(9) / 8
-    ring = np.cos(turns)[:, None, None] * frames[:, :3, 0]
-    ring = ring + np.sin(turns)[:, None, None] * frames[:, :3, 1]
-    # Smaller than the tip, so that neighbours do not hide each other.
-    ring = points + 0.2 * contacts.tip_radius * ring
-    for column, turn in enumerate((0.6, 0.6 + np.pi)):
-        axes = figure.add_axes((0.5 * column, 0.05, 0.5, 0.85))
-        camera, scene = Camera(turn, ELEVATION), Scene()
-        solid = (fit.mesh.vertices - origin) @ rotation
-        _add_triangles(scene, camera, solid[fit.mesh.faces])
-        seen = (normals @ camera.towards) < 0.0
-        for one, two in pairwise(ring):
-            corners = np.stack([points, one, two], axis=1)[seen]
-            flat, depth = camera.project(corners)
-            # In front of the triangles on which they lie.
-            nearness = depth.mean(axis=1) + 0.1 * fit.residual.size
-            scene.add(flat, nearness, shades[seen], shades[seen], 0.3)
-        scene.draw(axes)
-        finish(axes)
-    figure.suptitle(f"{title}    {len(contacts)} places for a fingertip".strip(), fontsize=13)
-    return figure
 
 
 def plot_surface(
@@ -468,10 +430,10 @@ def _add_object(scene: Scene, camera: Camera, thing: Object, fit: Fit) -> None:
             square = half * np.array([[-1.0, -1.0], [1.0, 1.0], [corner, -corner]])
             scene.add(flat[:, None, :] + square, depth, fill, (0, 0, 0, 0))
         return
-    _add_triangles(scene, camera, local[thing.faces])
+    add_triangles(scene, camera, local[thing.faces])
 
 
-def _add_triangles(scene: Scene, camera: Camera, triangles: Floats) -> None:
+def add_triangles(scene: Scene, camera: Camera, triangles: Floats) -> None:
     """A solid of triangles. Shape (n, 3, 3)."""
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
