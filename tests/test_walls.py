@@ -166,9 +166,7 @@ def test_the_regression_is_least_squares():
     full[np.arange(400)[:, None], design.cells] = design.values
     weights = np.maximum(rng.random(400) - 0.2, 0.0)
     band, right = _core.normal_equations(full.shape[1], 4 * columns, *design, weights, radius)
-    np.testing.assert_allclose(
-        dense(band, columns), full.T @ (weights[:, None] * full), atol=1e-13
-    )
+    np.testing.assert_allclose(dense(band, columns), full.T @ (weights[:, None] * full), atol=1e-13)
     np.testing.assert_allclose(right, full.T @ (weights * radius), atol=1e-13)
     band += _penalty(intervals, columns, FOR_SCANS)
     found = _core.solve_banded(band, right)

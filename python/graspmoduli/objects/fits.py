@@ -1,101 +1,34 @@
-"""The fit of a surface to a real object, and grasps in the coordinates of the object."""
+"""Grasps of an object to which a surface is fitted, in the coordinates of the object."""
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import permutations
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import (
-    Floats,
-    a_path,
-    brief,
-    count,
-    finite,
-    floats,
-    locked,
-    number,
-    vectors,
-)
-from .._batches import NORMS, Cone, evaluated_with, fingers
-from .._core import GraspModuliError, arctan2
-from .._files import replacing
-from .._values import Value
-from ..grasps import Grasp, PlacedGrasp, a_grasp
-from ..quality import circular_quality, quality
-from ..surfaces import Surface
+from .._arrays import Floats, brief, count, finite, floats, locked, number
+from .._batches import NORMS, Cone, fingers
+from .._core import GraspModuliError
+from ..grasps import Grasp
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
-from .agreement import Residual as Residual
-from .agreement import distances
+from .fitted import Fitted
 from .likeness import cells, ways
 from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
 from .reading import read
-from .scanned import Scanned
-from .touching import TIP, Pressed, Search, TriangleMesh, press, search, tip
-from .walls import CLOSE, Booleans
+from .touching import TIP, Pressed, Search, press, search, tip
+from .walls import CLOSE
 
-#: The version of the files that Fit.save writes.
-FILE_VERSION = 2
 #: Grasps of a mesh of lower quality are force closure, but hold nothing.
 LEAST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Fit(Value):
+class Fit(Fitted):
     """A surface fitted to an object."""
-
-    #: The surface, about its own axis, in the unit of the object.
-    surface: Surface
-    #: Rigid motion from the surface's coordinates to the object's. Shape (4, 4).
-    pose: Floats
-    residual: Residual
-    #: Share of the surface's area where there is an object: of a mesh, within 2 % of its size; of a
-    #: cloud, where it was seen, as the rest is filled in smoothly.
-    coverage: float
-    #: Share of the object farther than 2 % of its size from the surface: of a mesh, of the area
-    #: visible from outside, the surface being closed by lids; of a cloud, of its outer wall.
-    unexplained: float
-    #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
-    #: Shape (k, n).
-    allowed: Booleans = field(repr=False)
-    #: Is it one part of several (:func:`fit_parts`)? Its grasps then lie on its surface.
-    part: bool = False
-    #: The object's mesh, where it came as one: grasps are pressed on it.
-    mesh: TriangleMesh | None = None
-    #: The object's points, where it came as a cloud: contacts that were seen are pressed on them.
-    scanned: Scanned | None = None
-
-    @property
-    def center_of_mass(self) -> Floats:
-        """The object's centre of mass, in its own coordinates. Shape (3,).
-
-        Of a closed mesh that of the solid, its density uniform; of an open one that of its
-        triangles' area; of a cloud of points the fitted surface's z_S.
-        """
-        if self.mesh is not None:
-            return self.mesh.shape.center_of_mass
-        return locked(self.to_object(self.surface.center_of_mass))
-
-    @property
-    def length_scale(self) -> float:
-        """The object's radius about its centre of mass: torques are divided by it for Q_l.
-
-        Of a mesh the largest distance of a vertex; of a cloud of points that of the surface.
-        """
-        return self._surface_radius if self.mesh is None else self.mesh.radius
-
-    @property
-    def _surface_radius(self) -> float:
-        return self.surface.radius_about(self.surface.center_of_mass)
-
-    @property
-    def unit_surface(self) -> Surface:
-        """The surface divided by its radius about its own centre of mass: to compare shapes."""
-        return (1.0 / self._surface_radius) * self.surface
 
     def synthesize(
         self,
@@ -164,26 +97,16 @@ class Fit(Value):
             return self._of_cloud(size, many, hand, start, center, tip_radius, errors)
         radius = tip(self.mesh, tip_radius)
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
-        wanted = Search(hand, center, self.length_scale, size, many, aim)
+        # From a part some climb off to another: they are left out.
+        followed = min(4 * many, MOST_FOLLOWED) if self.part else many
+        wanted = Search(hand, center, self.length_scale, size, followed, aim)
         found = search(self.mesh, radius, start, wanted, self._is_on if self.part else None)
         grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
         if self.part:
-            # Those that climbed off it are grasps of another part.
             grasps = [one for one in grasps if self._is_on(one.contacts).all()]
         # Equal ones stay in the order of their Q_l.
         key = by_round_cones if errors is None else by_errors
         return sorted(grasps, key=key, reverse=True)[:many]
-
-    def _is_on(self, points: Floats) -> Booleans:
-        """Do points, in the object's coordinates, lie on the part?"""
-        near = distances(points, self.surface, self.pose) <= CLOSE * self.residual.size
-        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-        rows, columns = self.allowed.shape
-        u = (local[:, 2] - self.surface.bottom) / (self.surface.top - self.surface.bottom)
-        angle = arctan2(np.ascontiguousarray(local[:, 1]), np.ascontiguousarray(local[:, 0]))
-        row = np.clip((u * rows).astype(np.int64), 0, rows - 1)
-        column = np.floor(angle / (2 * np.pi) * columns).astype(np.int64) % columns
-        return near & self.allowed[row, column]
 
     def _center(self, center_of_mass: ArrayLike | None) -> Floats:
         if center_of_mass is None:
@@ -275,29 +198,6 @@ class Fit(Value):
             checks.append(check)
         return self._object_grasp(flat.grasp, contacts, normals, hand, center, checks=tuple(checks))
 
-    def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
-        """A grasp on the fitted surface, in the object's own coordinates."""
-        a_grasp("grasp", grasp)
-        return self._placed(grasp, fingers(friction, edges, len(grasp)), self.center_of_mass)
-
-    def _placed(self, grasp: Grasp, hand: Cone, center: Floats) -> ObjectGrasp:
-        contacts = self.to_object(self.surface.points(grasp.u, grasp.theta))
-        normals = self.directions_to_object(self.surface.normals(grasp.u, grasp.theta))
-        return self._object_grasp(grasp, contacts, normals, hand, center)
-
-    def on_surface(self, grasp: ObjectGrasp) -> Grasp:
-        """The grasp's place in G^cyl: contact coordinates of its contacts on the fitted surface.
-
-        Of contacts that are not on it, those of the nearest points of the surface.
-        """
-        if not isinstance(grasp, ObjectGrasp):
-            raise GraspModuliError(f"grasp must be an ObjectGrasp, got {brief(grasp)}")
-        if grasp.grasp is not None:
-            return grasp.grasp
-        local = (grasp.contacts - self.pose[:3, 3]) @ self.pose[:3, :3]
-        u, theta, _ = self.surface.coordinates(local)
-        return Grasp(u, theta)
-
     def on_mesh(
         self, mesh: Any, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8
     ) -> ObjectGrasp:
@@ -353,6 +253,10 @@ class Fit(Value):
         explained by its surface or, of a scan, was not seen. On a target with a mesh the contacts
         are then pressed on the mesh, where a tip of 5 % of its size touches near them, and climb
         there; where that leaves nothing true, an error says so.
+
+        Between parts (:func:`fit_parts`), whose angles have no common origin, one part is laid on
+        the other instead, principal axes on principal axes and stretched to these; where no grasp
+        that starts there stays on the part, the part's own grasp that is nearest is taken.
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
@@ -373,22 +277,25 @@ class Fit(Value):
         wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
         starts = [(arrived.contacts, arrived.normals)]
         if self.part and target.part:
-            starts += self._laid_on(target, placed)
+            starts = self._laid_on(target, placed)
         found = []
         for contacts, normals in starts:
             pressed = press(target.mesh, TIP, contacts, normals, wanted)
             if pressed is not None:
                 found += target._touched([pressed], wanted)
-        # On a part, grasps that stay on it come first.
         if target.part:
-            found.sort(key=lambda one: int(target._is_on(one.contacts).sum()), reverse=True)
+            found = [one for one in found if target._is_on(one.contacts).all()]
+            if not found:
+                # Where none of these stays on the part, its own grasp that is most like them.
+                own = target.synthesize(contacts=len(grasp), top=10, friction=friction, edges=edges)
+                found = sorted(own, key=lambda one: _unlike(one.contacts, starts))[:1]
         if not found:
             raise GraspModuliError(
                 "grasp must be one that the target's mesh can be grasped with, got contacts that "
                 f"no tip reaches or that lose force closure there (on its surface Q is "
                 f"{arrived.quality:.3g})"
             )
-        return found[0]
+        return max(found, key=by_round_cones)
 
     def _laid_on(self, target: Fit, grasp: ObjectGrasp) -> list[tuple[Floats, Floats]]:
         """Contacts and normals of a grasp with this part laid on another that is like it."""
@@ -426,89 +333,11 @@ class Fit(Value):
             grasps.append(made)
         return grasps
 
-    def _object_grasp(
-        self,
-        grasp: Grasp | None,
-        contacts: Floats,
-        normals: Floats,
-        hand: Cone,
-        center: Floats,
-        **others: Any,
-    ) -> ObjectGrasp:
-        made = PlacedGrasp(contacts, normals, center)
-        options: dict[str, Any] = evaluated_with(hand) | {"length_scale": self.length_scale}
-        rest = {name: value for name, value in options.items() if name != "edges"}
-        bounds = circular_quality(made, **rest)
-        if grasp is not None and "coordinates" not in others:
-            others["coordinates"] = locked(np.stack([grasp.u, grasp.theta], axis=1))
-        return ObjectGrasp(
-            made.contacts,
-            made.normals,
-            made.center_of_mass,
-            grasp=grasp,
-            surface=self.surface,
-            quality=quality(made, **options),
-            round_quality=(bounds.lower, bounds.upper),
-            **options,
-            **others,
-        )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the fit as a NumPy ``.npz`` file, whole or not at all."""
-        with replacing(a_path(path)) as temporary, temporary.open("wb") as file:
-            np.savez(
-                file,
-                graspmoduli_fit=FILE_VERSION,
-                coefficients=self.surface.coefficients,
-                heights=[self.surface.bottom, self.surface.top],
-                pose=self.pose,
-                residual=[self.residual.rms, self.residual.max, self.residual.size],
-                shares=[self.coverage, self.unexplained],
-                allowed=self.allowed,
-                part=self.part,
-                **({} if self.mesh is None else self.mesh.saved()),
-                **({} if self.scanned is None else self.scanned.saved()),
-            )
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Fit:
-        """Reads what :meth:`save` wrote."""
-        file = a_path(path)
-        try:
-            with file.open("rb") as handle, np.load(handle) as data:
-                version = int(data["graspmoduli_fit"])
-                if version == FILE_VERSION:
-                    bottom, top = data["heights"].tolist()
-                    residual = Residual(*data["residual"].tolist())
-                    coverage, unexplained = data["shares"].tolist()
-                    return cls(
-                        surface=Surface.from_coefficients(data["coefficients"], bottom, top),
-                        pose=locked(floats("pose", data["pose"]).reshape(4, 4)),
-                        residual=residual,
-                        coverage=coverage,
-                        unexplained=unexplained,
-                        allowed=data["allowed"].astype(bool, casting="no"),
-                        part="part" in data and bool(data["part"]),
-                        mesh=TriangleMesh.loaded(data, residual.size),
-                        scanned=Scanned.loaded(data, residual.size),
-                    )
-        except FileNotFoundError:
-            raise GraspModuliError(f"path must be a fit's file, got no file {path}") from None
-        # NumPy and zipfile raise what they like on files of other kinds.
-        except Exception as error:
-            raise GraspModuliError(
-                f"path must be a file that Fit.save wrote, got {path} ({brief(str(error))})"
-            ) from None
-        raise GraspModuliError(
-            f"path must be a fit's file of version {FILE_VERSION}, got version {version} in {path}"
-        )
-
-    def to_object(self, points: ArrayLike) -> Floats:
-        """Points from the surface's to the object's coordinates. Shape (..., 3)."""
-        given = finite("points", vectors("points", points, "(..., 3)"))
-        return given @ self.pose[:3, :3].T + self.pose[:3, 3]
-
-    def directions_to_object(self, directions: ArrayLike) -> Floats:
-        """Normals from the surface's to the object's coordinates. Shape (..., 3)."""
-        given = finite("directions", vectors("directions", directions, "(..., 3)"))
-        return given @ self.pose[:3, :3].T
+def _unlike(contacts: Floats, starts: list[tuple[Floats, Floats]]) -> float:
+    """How far contacts are from the nearest of others, in any order of the fingers."""
+    return min(
+        float(np.sqrt(((contacts[list(order)] - others) ** 2).sum(axis=1)).max())
+        for others, _ in starts
+        for order in permutations(range(len(contacts)))
+    )

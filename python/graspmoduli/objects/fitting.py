@@ -21,10 +21,10 @@ from .._arrays import (
 )
 from .._core import GraspModuliError
 from ..surfaces import Surface
+from .agreement import Residual as Residual
 from .agreement import phantom_area, unexplained_area
 from .axes import FARTHEST, candidate_axes, refined, same_axis, score
 from .fits import Fit as Fit
-from .fits import Residual as Residual
 from .object_grasps import ObjectGrasp as ObjectGrasp
 from .reading import Object, read
 from .scanned import Scanned
