@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Floats, a_callback, locked, vectors
+from .._arrays import Floats, a_callback, finite, locked, vectors
 from .._core import GraspModuliError
 from .._values import Value
 from .agreement import Residual, distances, phantom_area, visible
@@ -33,7 +33,7 @@ LEAST = 0.005
 #: Smaller pieces than this share of the visible area are taken together with all others.
 SMALL = 0.05
 #: A surface for all that is left must explain so many times what one for the largest piece does.
-TOGETHER = 1.6
+TOGETHER = 1.8
 #: Fewest points of a piece, and its least height along an axis, over its size.
 FEWEST, FLAT = 50, 1e-3
 
@@ -64,15 +64,19 @@ class Parts(Value):
         return np.bincount(known, minlength=len(self.parts)) / len(self.part)
 
     def part_of(self, points: Any) -> NDArray[np.int64]:
-        """The first part within 2 % of the size of each point, -1 where there is none.
+        """The part of the surface that is within 2 % of the size of each point, -1 of none.
 
         Parameters
         ----------
         points
             In the object's coordinates. Shape (..., 3); the result has shape (...).
         """
+        from scipy.spatial import KDTree
+
         given = vectors("points", points, "(..., 3)")
-        return _first(self.parts, given.reshape(-1, 3)).reshape(given.shape[:-1])
+        away, nearest = KDTree(self.points).query(finite("points", given))
+        near: Any = away <= CLOSE * self.parts[0].residual.size
+        return np.where(near, self.part[nearest], -1)
 
 
 def fit_parts(
@@ -122,6 +126,7 @@ def fit_parts(
         first = fit_object(thing)
         left = distances(points, first.surface, first.pose) > CLOSE * thing.size
         parts = [_as_part(first, body, points, ~left)]
+        owner = np.where(left, -1, 0)
         given_up = np.zeros(len(points), dtype=np.bool_)
         near = _spacing(points)
         while left.mean() > 1.0 - ENOUGH and len(parts) < MOST_PARTS:
@@ -130,17 +135,23 @@ def fit_parts(
             rest = np.flatnonzero(left & ~given_up)
             if len(rest) < FEWEST:
                 break
-            piece = _largest(points[rest], near)
-            found = _best(points, normals, rest, rest[piece], left, thing.size)
+            pieces = np.full(len(points), -1, dtype=np.int64)
+            pieces[rest] = _connected(points[rest], near)
+            largest = int(np.bincount(pieces[rest]).argmax())
+            found = _best(points, normals, pieces, largest, thing.size)
             if found is None:
-                given_up[rest[piece]] = True
+                given_up[pieces == largest] = True
                 continue
-            one, explained = found
-            parts.append(_as_part(one, body, points, left & explained))
-            left &= ~explained
+            one, own = found
+            owner[own] = len(parts)
+            parts.append(_as_part(one, body, points, own))
+            left &= ~own
     if progress is not None:
         progress(100, 100)
-    owner = _first(tuple(parts), points)
+    # What a part explains beside its own pieces, if no other has it.
+    for number, one in enumerate(parts):
+        away = distances(points, one.surface, one.pose)
+        owner[(owner < 0) & (away <= CLOSE * thing.size)] = number
     return Parts(
         parts=tuple(parts),
         unexplained=float((owner < 0).mean()),
@@ -158,36 +169,41 @@ def _spacing(points: Floats) -> float:
     return 2.0 * float(np.median(distances[:, -1]))
 
 
-def _largest(points: Floats, near: float) -> NDArray[np.int64]:
-    """Which points the largest connected piece is made of."""
+def _connected(points: Floats, near: float) -> NDArray[np.int64]:
+    """The number of the connected piece that each point belongs to."""
     from scipy.spatial import KDTree
 
-    piece = parts_of(KDTree(points), near)
-    return np.flatnonzero(piece == np.bincount(piece).argmax())
+    return parts_of(KDTree(points), near)
 
 
 def _best(
-    points: Floats,
-    normals: Floats,
-    rest: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    left: Booleans,
-    size: float,
+    points: Floats, normals: Floats, pieces: NDArray[np.int64], largest: int, size: float
 ) -> tuple[Fit, Booleans] | None:
-    """The surface that explains most of what is left, and which points it explains."""
+    """The surface that explains most of what is left, and which points are then its own.
+
+    Of pieces of which it explains less than half it crosses a part that is another's.
+    """
+    left = pieces >= 0
+    total = np.bincount(pieces[left])
     best: tuple[Fit, Booleans] | None = None
     most = LEAST
-    for chosen in (piece, rest):
-        # Pieces that lie apart make sense together only if they are one surface.
-        together = chosen is rest and len(piece) > SMALL * len(points)
-        if chosen is rest and len(rest) < 1.05 * len(piece):
+    for together in (False, True):
+        chosen = np.flatnonzero(left if together else pieces == largest)
+        if together and len(chosen) < 1.05 * total[largest]:
             break
-        bar = most * TOGETHER if together and best is not None else most
+        # Pieces that lie apart make sense together only if they are one surface.
+        apart = together and best is not None and total[largest] > SMALL * len(points)
+        bar = most * TOGETHER if apart else most
         for fit in _surfaces(points[chosen], normals[chosen]):
             explained = distances(points, fit.surface, fit.pose) <= CLOSE * size
-            gain = float((explained & left).mean())
+            share = np.bincount(pieces[left], explained[left]) / total
+            meant = share >= 0.5
+            meant[largest] |= not together
+            own = left & explained
+            own[left] &= meant[pieces[left]]
+            gain = float(own.mean())
             if gain > bar + 1e-3:
-                best, most, bar = (fit, explained), gain, gain
+                best, most, bar = (fit, own), gain, gain
     return best
 
 
@@ -247,12 +263,3 @@ def _as_part(fit: Fit, body: TriangleMesh, points: Floats, own: Booleans) -> Fit
         part=True,
         mesh=body,
     )
-
-
-def _first(parts: tuple[Fit, ...], points: Floats) -> NDArray[np.int64]:
-    """The first part that explains each point, -1 if none does."""
-    owner = np.full(len(points), -1, dtype=np.int64)
-    for number, one in enumerate(parts):
-        away = distances(points, one.surface, one.pose)
-        owner[(owner < 0) & (away <= CLOSE * one.residual.size)] = number
-    return owner
