@@ -3,6 +3,7 @@
 =====================  ======================================================================
 grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
+given wrenches         :func:`quality_of_wrenches`
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench;
                        :func:`contact_frames`
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
@@ -68,6 +69,7 @@ from .quality import largest_quality as largest_quality
 from .quality import quality as quality
 from .quality import quality_at_least as quality_at_least
 from .quality import quality_gradient as quality_gradient
+from .quality import quality_of_wrenches as quality_of_wrenches
 from .quality import smallest_quality as smallest_quality
 from .sampling import sample_points as sample_points
 from .surfaces import Surface as Surface

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, locked, number
+from ._arrays import Floats, finite, floats, locked, number
 from ._batches import Batch, GraspLike, batch, check_gradient
 from ._core import GraspModuliError
 from ._values import Value
@@ -371,3 +371,52 @@ def circular_quality(
         if isinstance(bound, np.ndarray):
             locked(bound)
     return Bounds(lower, upper, wanted)
+
+
+def quality_of_wrenches(wrenches: ArrayLike) -> Any:
+    """The distance from the origin to the boundary of the convex hull of given wrenches.
+
+    For all that is no friction cone on a surface: suction cups, magnets, tendons, cones of another
+    shape, contacts with limits of force of their own. Q_l (Sec. II) is that of the wrenches of its
+    cones' edges; with three components it is the planar quality of courses and of many published
+    numbers. Exact to rounding, 0 if the origin is not in the interior, the same to the bit
+    whatever the order of the wrenches.
+
+    Parameters
+    ----------
+    wrenches
+        Forces and torques, (..., k, 6), or in the plane (f_x, f_y, τ), (..., k, 3). Torques are
+        taken as they are: divide them by a length for a distance that does not depend on the unit.
+
+    Returns
+    -------
+    float or array of shape (...)
+        In the unit of the wrenches.
+
+    Raises
+    ------
+    GraspModuliError
+        If the shape is another one or a number is not finite.
+
+    Examples
+    --------
+    Two fingers with a friction coefficient of 1 on either side of a square of width 2:
+
+    >>> import graspmoduli as gm
+    >>> fingers = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    >>> round(gm.quality_of_wrenches(fingers), 12)
+    0.57735026919
+    """
+    given = finite("wrenches", floats("wrenches", wrenches))
+    if given.ndim < 2 or given.shape[-1] not in (3, 6):
+        raise GraspModuliError(
+            f"wrenches must have shape (..., k, 6), or (..., k, 3) in the plane, got {given.shape}"
+        )
+    shape, (count, width) = given.shape[:-2], given.shape[-2:]
+    rows = given.reshape(int(np.prod(shape)), count, width)
+    # Of size 1, as their squares have to be numbers.
+    sizes = np.abs(rows).max(axis=(1, 2), initial=0.0)
+    unit = np.where(sizes > 0.0, sizes, 1.0)
+    scaled = np.ascontiguousarray(rows / unit[:, None, None])
+    values = _core.quality_of_wrenches(scaled) * unit if count else np.zeros(len(rows))
+    return float(values[0]) if shape == () else values.reshape(shape)

@@ -5,7 +5,7 @@ use crate::{Cone, raise, table, vectors};
 use graspmoduli::contact::{Contact, Frame, FrictionCone};
 use graspmoduli::error::Error;
 use graspmoduli::guarantees;
-use graspmoduli::quality::{Batch, Evaluator, Gradient};
+use graspmoduli::quality::{Batch, Evaluator, Gradient, of_each, of_plane_wrenches, of_wrenches};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods,
@@ -234,6 +234,24 @@ pub fn quality<'py>(
     let (cone, batch) = (cone.0, grasps.batch()?);
     let mut out = vec![0.0; batch.centers.len()];
     computed(py, batch, |batch| batch.quality(&cone, &mut out))?;
+    Ok(PyArray1::from_vec(py, out))
+}
+
+/// Distances of the origin from the boundaries of n hulls of k wrenches, (n, k, 6) or (n, k, 3).
+#[pyfunction]
+pub fn quality_of_wrenches<'py>(
+    py: Python<'py>,
+    wrenches: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (count, width) = (wrenches.shape()[1], wrenches.shape()[2]);
+    let all = wrenches.as_slice()?;
+    let out = interruptible(py, |stop| {
+        if width == 3 {
+            of_each(of_plane_wrenches, all.as_chunks().0, count, stop)
+        } else {
+            of_each(of_wrenches, all.as_chunks().0, count, stop)
+        }
+    })?;
     Ok(PyArray1::from_vec(py, out))
 }
 

@@ -7,6 +7,7 @@ mod apex_ray_face;
 mod batch;
 mod evaluator;
 mod force_closure;
+mod given;
 mod gradient;
 mod instructions;
 mod lanes;
@@ -24,6 +25,7 @@ mod wrenches;
 
 pub use batch::Batch;
 pub use evaluator::{Evaluator, Weakest};
+pub use given::{of_each, of_plane_wrenches, of_wrenches};
 pub use gradient::{Gradient, MOST_EACH};
 pub use instructions::instructions_name;
 pub(crate) use polytope::LARGEST_ERROR;

@@ -170,7 +170,7 @@ impl Support for Wrenches {
 }
 
 /// The weighted mean of some vectors.
-fn mean(terms: impl Iterator<Item = (f64, Twist)>) -> Twist {
+pub(super) fn mean(terms: impl Iterator<Item = (f64, Twist)>) -> Twist {
     let (mut sum, mut total) = ([0.0; 6], 0.0);
     for (weight, term) in terms {
         sum = add(&sum, weight, &term);
