@@ -264,6 +264,9 @@ class TestFiles:
     def test_an_array_knows_its_camera(self):
         self.check(quiet(read, self.view().points))
 
+    def test_zeros_are_missing_pixels(self):
+        self.check(quiet(read, np.nan_to_num(self.view().points)))
+
     def test_numpy(self, tmp_path):
         np.save(tmp_path / "v.npy", self.view().points)
         self.check(quiet(read, tmp_path / "v.npy"))

@@ -34,6 +34,10 @@ def of_points(array: Floats, camera: Floats | None) -> Capture:
     Where the camera was is found from an image, and has to be given for points.
     """
     shape = array.shape
+    if array.ndim == 3 and shape[2] == 3:
+        # Some cameras write 0 where nothing came back: no point is where the camera is.
+        array = array.copy()
+        array[~array.any(axis=2)] = np.nan
     flat = array.reshape(-1, 3) if array.ndim == 3 and shape[2] == 3 else array
     if flat.ndim != 2 or flat.shape[1] != 3:
         raise GraspModuliError(f"object must have points of shape (n, 3), got {shape}")
