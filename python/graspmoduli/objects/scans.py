@@ -22,6 +22,8 @@ TRIES, TRIED = 600, 3_000
 LEAST_TABLE, SECTORS, AROUND_SEEN, AROUND = 0.1, 12, 7, 10
 #: Nearly all points are not below it.
 ABOVE = 0.97
+#: Points this close, over the size of all, are connected.
+FINEST = 1e-3
 #: Parts of a scan with a smaller share of its points are noise.
 SMALLEST_PART = 0.05
 #: Parts nearer than this, over the size of all, are one object; and, where one hides the other's
@@ -145,7 +147,10 @@ def objects_of(
     tree = KDTree(points)
     size = float(np.ptp(points, axis=0).max())
     distances: Any = tree.query(points, k=NEIGHBOURS + 1)[0]
-    near = 2.5 * float(np.median(distances[:, -1]))
+    if not size > 0.0:
+        raise GraspModuliError("object must be solid, got nearly all points in one place")
+    # Repeated points have no distance.
+    near = max(2.5 * float(np.median(distances[:, -1])), FINEST * size)
     part = _connected(points, near)
     counts = np.bincount(part)
     large = np.flatnonzero(counts >= max(SMALLEST_PART * len(points), 10))
