@@ -49,7 +49,8 @@ def from_file(path: Path) -> Held:
     kind = path.suffix.lower()
     if kind not in FORMATS:
         raise GraspModuliError(
-            f"object must be a file of a known format ({' '.join(FORMATS)}), got {path.name}"
+            f"object must be a file of a known format ({' '.join(FORMATS)}, or .toml for depth "
+            f"images), got {path.name}"
         )
     if path.stat().st_size == 0:
         raise GraspModuliError(f"object must not be empty, got the empty file {path}")
