@@ -255,8 +255,9 @@ class Fit(Fitted):
         there; where that leaves nothing true, an error says so.
 
         Between parts (:func:`fit_parts`), whose angles have no common origin, one part is laid on
-        the other instead, principal axes on principal axes and stretched to these; where no grasp
-        that starts there stays on the part, the part's own grasp that is nearest is taken.
+        the other instead, whatever the method, principal axes on principal axes and stretched to
+        these; where no grasp that starts there stays on the part, the part's own grasp that is
+        nearest is taken.
         """
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
@@ -264,20 +265,22 @@ class Fit(Fitted):
             placed, grasp = grasp, self.on_surface(grasp)
         else:
             placed = self.in_object(grasp, friction=friction, edges=edges)
-        start, end = self.unit_surface, target.unit_surface
-        allowed = target.allowed if method == "ascent" else None
-        carried = transfer(
-            start, grasp, end, method, friction=friction, edges=edges, allowed=allowed
-        )
-        arrived = target.in_object(carried.grasp, friction=friction, edges=edges)
-        if target.mesh is None:
-            return arrived
+        if self.part and target.part:
+            starts = self._laid_on(target, placed)
+        else:
+            allowed = target.allowed if method == "ascent" else None
+            carried = transfer(
+                self.unit_surface, grasp, target.unit_surface, method,
+                friction=friction, edges=edges, allowed=allowed,
+            )  # fmt: skip
+            arrived = target.in_object(carried.grasp, friction=friction, edges=edges)
+            starts = [(arrived.contacts, arrived.normals)]
+            if target.mesh is None:
+                return arrived
+        assert target.mesh is not None
         hand = fingers(friction, edges, len(grasp))
         aim = 0.5 * TIP * target.mesh.size
         wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
-        starts = [(arrived.contacts, arrived.normals)]
-        if self.part and target.part:
-            starts = self._laid_on(target, placed)
         found = []
         for contacts, normals in starts:
             pressed = press(target.mesh, TIP, contacts, normals, wanted)
@@ -292,8 +295,7 @@ class Fit(Fitted):
         if not found:
             raise GraspModuliError(
                 "grasp must be one that the target's mesh can be grasped with, got contacts that "
-                f"no tip reaches or that lose force closure there (on its surface Q is "
-                f"{arrived.quality:.3g})"
+                "no tip reaches or that lose force closure there"
             )
         return max(found, key=by_round_cones)
 

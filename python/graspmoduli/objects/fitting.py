@@ -25,6 +25,7 @@ from .agreement import Residual as Residual
 from .agreement import phantom_area, unexplained_area
 from .axes import FARTHEST, candidate_axes, refined, same_axis, score
 from .fits import Fit as Fit
+from .likeness import cells
 from .object_grasps import ObjectGrasp as ObjectGrasp
 from .reading import Object, read
 from .scanned import Scanned
@@ -235,14 +236,7 @@ def _pose(axis: Axis, middle: float) -> Floats:
 
 def _coverage(surface: Surface, good: Booleans) -> float:
     """Share of the area in cells where a cloud was seen, small holes between its points aside."""
-    rows, columns = good.shape
-    u, theta = np.meshgrid(
-        (np.arange(rows) + 0.5) / rows,
-        (np.arange(columns) + 0.5) * 2 * np.pi / columns,
-        indexing="ij",
-    )
-    first, second = surface.tangents(u, theta)
-    area = np.linalg.norm(np.cross(first, second), axis=-1)
+    area = cells(surface, np.eye(4), np.ones_like(good))[1].reshape(good.shape)
     covered = ~_dilated(~_dilated(good, 1), 1)
     return float(area[covered].sum() / area.sum())
 

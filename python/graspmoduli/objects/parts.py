@@ -125,6 +125,11 @@ def fit_parts(
         warnings.simplefilter("ignore", UserWarning)
         first = fit_object(thing)
         left = distances(points, first.surface, first.pose) > CLOSE * thing.size
+        if left.mean() > 1.0 - LEAST:
+            raise GraspModuliError(
+                "mesh_or_path must have an outer wall that is close to a surface in cylindrical "
+                "coordinates, got one that explains nothing"
+            )
         parts = [_as_part(first, body, points, ~left)]
         owner = np.where(left, -1, 0)
         given_up = np.zeros(len(points), dtype=np.bool_)

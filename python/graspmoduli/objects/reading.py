@@ -146,7 +146,7 @@ def _of_cloud(
     if found.table is not None:
         notes.append(
             f"a table was found, {found.of_table:.0%} of the points, and left out; contacts keep "
-            "clear of it"
+            "clear of it (keep_table if it belongs to the object)"
         )
     if found.parts > 1:
         notes.append(
