@@ -17,7 +17,9 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`, :func:`fit_parts`, :func:`contact_map`
-errors                 :class:`GraspModuliError`, :class:`MissingExtraError`
+where fingers may go   :class:`Constraints`
+errors                 :class:`GraspModuliError`, :class:`NoGraspLeftError`,
+                       :class:`MissingExtraError`
 =====================  ======================================================================
 
 The mathematics is that of F. T. Pokorny, K. Hang, D. Kragic, *Grasp Moduli Spaces*, RSS 2013.
@@ -33,6 +35,8 @@ from ._extras import MissingExtraError as MissingExtraError
 from .configurations import Configurations as Configurations
 from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
+from .constraints import Constraints as Constraints
+from .constraints import NoGraspLeftError as NoGraspLeftError
 from .epsilon import Epsilon as Epsilon
 from .epsilon import epsilon as epsilon
 from .grasps import Grasp as Grasp

@@ -17,6 +17,19 @@ class GraspModuliError(ValueError):
 _Grasps = tuple[_Floats, _Floats, _Floats, _Floats | None]
 #: Friction coefficients, one for all contacts or one each; edges; torsion; a limit each?
 _Cone = tuple[list[float], int, float, bool]
+#: Where fingers may go: opening, distance of the tips' middles, their radius and way, approach,
+#: obstacles, wanted and unwanted zones.
+_Zones = list[tuple[bool, tuple[float, float, float], tuple[float, float, float]]]
+_Limits = tuple[
+    list[float],
+    float,
+    float,
+    float,
+    tuple[tuple[float, float, float], float] | None,
+    _Zones,
+    _Zones,
+    _Zones,
+]
 
 # The same bits on every processor, unlike NumPy's.
 def sin(x: _Floats) -> _Floats: ...
@@ -54,6 +67,8 @@ def extreme_quality(grasps: _Grasps, cone: _Cone, largest: bool) -> tuple[int, f
 def circular_quality(grasps: _Grasps, cone: _Cone, tolerance: float) -> _Floats: ...
 def weakest(grasps: _Grasps, cone: _Cone) -> tuple[float, list[float]]: ...
 def certified_radius(grasps: _Grasps, cone: _Cone) -> float: ...
+def places_allowed(limits: _Limits, points: _Floats, normals: _Floats) -> NDArray[np.bool_]: ...
+def pairs_allowed(limits: _Limits, points: _Floats, normals: _Floats) -> NDArray[np.bool_]: ...
 def tangents(normals: _Floats) -> _Floats: ...
 def contact_forces(normals: _Floats, friction: _Floats, edges: int) -> _Floats: ...
 
@@ -151,7 +166,7 @@ def smallest_nearby(
 
 #: Friction cone, centre of mass, size over length scale, fingers, how many grasps, how far apart
 #: they are, errors of aim.
-_Request = tuple[_Cone, tuple[float, float, float], float, int, int, float, float]
+_Request = tuple[_Cone, tuple[float, float, float], float, int, int, float, float, bool, _Limits]
 #: Places (m, 9); Q_l as felt, with exact normals, by balls, held share and low quantile under
 #: errors; distance, cosine and clearance of each contact (m, 3).
 _Pressed = tuple[_Floats, list[float], _Floats]

@@ -2,6 +2,7 @@
 //! from `graspmoduli/_arrays.py`; arrays are contiguous float64.
 
 mod domain;
+mod limits;
 mod math;
 mod moduli;
 mod pool;
@@ -79,6 +80,8 @@ mod _core {
     use super::domain::{
         fill_configurations, fill_nearby, grasps_near, random_grasps, smallest_nearby, survey,
     };
+    #[pymodule_export]
+    use super::limits::{pairs_allowed, places_allowed};
     #[pymodule_export]
     use super::math::{
         arctan2, cos, exp, instructions, interpolate, normal_equations, power, sin, solve_banded,

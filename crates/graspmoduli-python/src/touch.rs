@@ -1,5 +1,6 @@
 //! Fingertips pressed on triangle meshes of size 1 about the origin.
 
+use crate::limits::Limits;
 use crate::pool::{detached, interruptible};
 use crate::{Cone, table, vectors};
 use graspmoduli::contact::FrictionCone;
@@ -25,12 +26,13 @@ type FoundGrasp<'py> = (
 );
 
 /// What grasps are looked for: cone, centre of mass, size over length scale, fingers, how many,
-/// how far they are apart, errors of aim.
+/// how far they are apart, errors of aim, are
+/// they polished, where fingers may go.
 #[derive(FromPyObject)]
-pub struct Request(Cone, [f64; 3], f64, usize, usize, f64, f64);
+pub struct Request(Cone, [f64; 3], f64, usize, usize, f64, f64, bool, Limits);
 
 impl Request {
-    fn wanted<'a>(&self, cone: &'a FrictionCone) -> Wanted<'a> {
+    fn wanted<'a>(&'a self, cone: &'a FrictionCone) -> Wanted<'a> {
         Wanted {
             cone,
             center: self.1.into(),
@@ -39,6 +41,8 @@ impl Request {
             top: self.4,
             apart: self.5,
             errors: self.6,
+            rounds: if self.7 { polish::ROUNDS } else { 0 },
+            limits: &self.8.0,
         }
     }
 }
@@ -213,7 +217,7 @@ impl Mesh {
         let limit = places.iter().map(|place| place.off).fold(0.0, f64::max);
         let found = detached(py, || {
             let tip = Tip::new(radius);
-            search::climbed(&self.0, &tip, &places, limit, polish::ROUNDS, &wanted)
+            search::climbed(&self.0, &tip, &places, limit, wanted.rounds, &wanted)
         });
         found.map(|found| grasp(py, found)).transpose()
     }

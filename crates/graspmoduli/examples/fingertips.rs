@@ -1,8 +1,10 @@
 //! Fingertips pressed on a triangle mesh, and the best true grasps of it.
 
 use graspmoduli::glam::DVec3;
+use graspmoduli::limits::Limits;
 use graspmoduli::touch::map::map;
 use graspmoduli::touch::mesh::Mesh;
+use graspmoduli::touch::polish::ROUNDS;
 use graspmoduli::touch::press::Tip;
 use graspmoduli::touch::search::grasps;
 use graspmoduli::touch::wanted::Wanted;
@@ -51,6 +53,8 @@ fn main() -> Result<(), Error> {
         top: 3,
         apart: 0.1,
         errors: 0.025,
+        rounds: ROUNDS,
+        limits: &Limits::none(),
     };
     let go = AtomicBool::new(false);
     for found in grasps(&mesh, &tip, &places, &wanted, 2, &go)?

@@ -63,6 +63,7 @@ pub mod domain;
 pub mod error;
 pub mod guarantees;
 pub mod interpolation;
+pub mod limits;
 pub mod math;
 mod nnls;
 mod parallel;

@@ -3,8 +3,10 @@
 
 use glam::{DMat3, DVec3};
 use graspmoduli::contact::FrictionCone;
+use graspmoduli::limits::Limits;
 use graspmoduli::touch::map::{Place, map};
 use graspmoduli::touch::mesh::Mesh;
+use graspmoduli::touch::polish::ROUNDS;
 use graspmoduli::touch::press::Tip;
 use graspmoduli::touch::search::grasps;
 use graspmoduli::touch::wanted::Wanted;
@@ -353,6 +355,8 @@ fn found(mesh: &Mesh, random: &[[f64; 3]], threads: usize) -> Vec<(Vec<Place>, f
         top: 3,
         apart: 0.075,
         errors: 0.025,
+        rounds: ROUNDS,
+        limits: &Limits::none(),
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

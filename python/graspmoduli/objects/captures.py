@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from .._arrays import Floats, brief, finite, floats, number
 from .._core import GraspModuliError
+from .._files import read_toml
 from .files import check_exists, from_file
 from .views import View, of_camera, of_depth, of_image
 
@@ -64,19 +64,8 @@ def merged(captures: list[Capture]) -> Capture:
 
 def from_toml(path: Path) -> Capture:
     """The views that a TOML file lists: one, or a ``[[view]]`` each; docs/object.md says how."""
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
     check_exists(path)
-    try:
-        with path.open("rb") as file:
-            data: dict[str, Any] = tomllib.load(file)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise GraspModuliError(
-            f"object must be a whole TOML file, got {path} ({reason[:120]})"
-        ) from None
+    data = read_toml("object", path)
     views = data.get("view", [data])
     if not isinstance(views, list) or not views or not all(isinstance(v, dict) for v in views):
         raise GraspModuliError(f"object must list its views as [[view]], got {brief(views)}")

@@ -12,14 +12,16 @@ from numpy.typing import ArrayLike
 from .._arrays import Floats, brief, count, finite, floats, locked, number
 from .._batches import NORMS, Cone, fingers
 from .._core import GraspModuliError
+from ..constraints import Constraints, NoGraspLeftError, a_constraint
 from ..grasps import Grasp
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer
 from .fitted import Fitted
 from .likeness import cells, ways
-from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones
+from .mesh_grasps import APART, Pressed, Search, press, search
+from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones, differ
 from .reading import read
-from .touching import TIP, Pressed, Search, press, search, tip
+from .touching import TIP, tip
 from .walls import CLOSE
 
 #: Grasps of a mesh of lower quality are force closure, but hold nothing.
@@ -43,6 +45,7 @@ class Fit(Fitted):
         center_of_mass: ArrayLike | None = None,
         tip_radius: float | None = None,
         errors: float | None = None,
+        constraints: Constraints | None = None,
     ) -> list[ObjectGrasp]:
         """Different grasps of high quality in the object's own coordinates, best first.
 
@@ -87,26 +90,81 @@ class Fit(Fitted):
         errors
             Errors of aim, a distance, that grasps should stand: they are ranked by the quality
             that nine of ten errors leave.
+        constraints
+            Where fingers may go and what they must hold.
+
+        Raises
+        ------
+        NoGraspLeftError
+            If the constraints leave none, though there are grasps without one of them.
         """
         size = count("contacts", contacts, 1, MOST_CONTACTS)
         many = count("top", top, 1, MOST_FOLLOWED)
         hand = fingers(friction, edges, size, torsion, norm)
         start = count("seed", seed, 0)
-        center = self._center(center_of_mass)
+        asked = a_constraint("constraints", constraints)
+        center = self._center(asked.center_of_mass if center_of_mass is None else center_of_mass)
         if self.mesh is None:
-            return self._of_cloud(size, many, hand, start, center, tip_radius, errors)
+            return self._of_cloud(size, many, hand, start, center, tip_radius, errors, asked)
         radius = tip(self.mesh, tip_radius)
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
-        # From a part some climb off to another: they are left out.
-        followed = min(4 * many, MOST_FOLLOWED) if self.part else many
-        wanted = Search(hand, center, self.length_scale, size, followed, aim)
-        found = search(self.mesh, radius, start, wanted, self._is_on if self.part else None)
-        grasps = [one for one in self._touched(found, wanted) if one.quality >= LEAST]
-        if self.part:
-            grasps = [one for one in grasps if self._is_on(one.contacts).all()]
         # Equal ones stay in the order of their Q_l.
         key = by_round_cones if errors is None else by_errors
-        return sorted(grasps, key=key, reverse=True)[:many]
+        wanted = Search(hand, center, self.length_scale, size, many, aim, asked)
+        found = self._of_mesh(radius, start, wanted)
+        if not found and asked.given:
+            self._check_constraints(radius, start, wanted)
+        return sorted(found, key=key, reverse=True)[:many]
+
+    def _of_mesh(self, radius: float, seed: int, wanted: Search) -> list[ObjectGrasp]:
+        """Grasps pressed on the mesh that keep all constraints."""
+        assert self.mesh is not None
+        asked, top = wanted.constraints, wanted.top
+        filtered = self.part or asked.after_search
+        kept: list[ObjectGrasp] = []
+        # From a part, or a region that only Python knows, some climb off: they are left out.
+        for polished in (True, False) if asked.after_search else (True,):
+            followed = min(4 * top, MOST_FOLLOWED) if filtered else top
+            now = wanted._replace(top=followed, polished=polished)
+            found = search(self.mesh, radius, seed, now, self._is_on if self.part else None)
+            kept += [
+                one
+                for one in self._touched(found, now)
+                if one.quality >= LEAST
+                and (not self.part or self._is_on(one.contacts).all())
+                and self._keeps(asked, one, radius * self.mesh.size)
+                and all(differ(one, other, APART * self.length_scale) for other in kept)
+            ]
+            if len(kept) >= top:
+                break
+        return kept
+
+    def _keeps(self, asked: Constraints, grasp: ObjectGrasp, tip_radius: float) -> bool:
+        """Is a grasp within what only Python can tell?"""
+        return not asked.given or (
+            asked.allow(grasp.contacts, grasp.normals, tip_radius=tip_radius) and asked.hold(grasp)
+        )
+
+    def _check_constraints(self, radius: float, seed: int, wanted: Search) -> None:
+        """An error that names the constraint without which there are grasps, if there is one."""
+        names = wanted.constraints.given
+        for name in names:
+            others = wanted._replace(constraints=wanted.constraints.without(name), top=1)
+            try:
+                found = self._of_mesh(radius, seed, others)
+            except NoGraspLeftError:
+                continue
+            if found:
+                raise NoGraspLeftError(
+                    f"{name} must leave a grasp of the object, got none; without it there are some"
+                )
+        if len(names) > 1 and self._of_mesh(
+            radius, seed, wanted._replace(constraints=Constraints(), top=1)
+        ):
+            raise NoGraspLeftError(
+                f"constraints must leave a grasp of the object, got none with any one of "
+                f"{', '.join(names)} left out; without all of them there are some"
+            )
 
     def _center(self, center_of_mass: ArrayLike | None) -> Floats:
         if center_of_mass is None:
@@ -136,6 +194,7 @@ class Fit(Fitted):
         center: Floats,
         tip_radius: float | None,
         errors: float | None,
+        asked: Constraints,
     ) -> list[ObjectGrasp]:
         mu, edges, torsion, each = hand
         if size != 3 or torsion > 0.0 or each:
@@ -245,6 +304,7 @@ class Fit(Fitted):
         *,
         friction: ArrayLike = 1.0,
         edges: int = 8,
+        constraints: Constraints | None = None,
     ) -> ObjectGrasp:
         """A grasp of this object carried to another one, in that one's own coordinates.
 
@@ -258,7 +318,11 @@ class Fit(Fitted):
         the other instead, whatever the method, principal axes on principal axes and stretched to
         these; where no grasp that starts there stays on the part, the part's own grasp that is
         nearest is taken.
+
+        The grasp keeps ``constraints``, in the target's coordinates; on a mesh, where none that
+        starts there does, the target's own grasp that is nearest and does is taken.
         """
+        asked = a_constraint("constraints", constraints)
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
         if isinstance(grasp, ObjectGrasp):
@@ -276,22 +340,32 @@ class Fit(Fitted):
             arrived = target.in_object(carried.grasp, friction=friction, edges=edges)
             starts = [(arrived.contacts, arrived.normals)]
             if target.mesh is None:
-                return arrived
+                if target._keeps(asked, arrived, 0.0):
+                    return arrived
+                raise NoGraspLeftError(
+                    f"constraints must leave the grasp where it arrives, got one that breaks "
+                    f"{' or '.join(asked.given)}"
+                )
         assert target.mesh is not None
         hand = fingers(friction, edges, len(grasp))
         aim = 0.5 * TIP * target.mesh.size
-        wanted = Search(hand, target.center_of_mass, target.length_scale, len(grasp), 1, aim)
+        center = target._center(asked.center_of_mass)
+        wanted = Search(hand, center, target.length_scale, len(grasp), 1, aim, asked)
         found = []
         for contacts, normals in starts:
             pressed = press(target.mesh, TIP, contacts, normals, wanted)
             if pressed is not None:
                 found += target._touched([pressed], wanted)
+        radius = TIP * target.mesh.size
+        found = [one for one in found if target._keeps(asked, one, radius)]
         if target.part:
             found = [one for one in found if target._is_on(one.contacts).all()]
-            if not found:
-                # Where none of these stays on the part, its own grasp that is most like them.
-                own = target.synthesize(contacts=len(grasp), top=10, friction=friction, edges=edges)
-                found = sorted(own, key=lambda one: _unlike(one.contacts, starts))[:1]
+        if (target.part or asked.given) and not found:
+            # Where none of these stays on the part, its own grasp that is most like them.
+            own = target.synthesize(
+                contacts=len(grasp), top=10, friction=friction, edges=edges, constraints=asked
+            )
+            found = sorted(own, key=lambda one: _unlike(one.contacts, starts))[:1]
         if not found:
             raise GraspModuliError(
                 "grasp must be one that the target's mesh can be grasped with, got contacts that "

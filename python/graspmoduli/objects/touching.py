@@ -5,7 +5,6 @@ The kernels are in ``crates/graspmoduli/src/touch``; they see the mesh at size 1
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import Floats, cores, count, floats, locked, number
-from .._batches import Cone
+from .._arrays import Floats, count, floats, locked, number
 from .._core import GraspModuliError
 from .._values import Value
 from .reading import Object, read
@@ -26,10 +24,6 @@ TIP = 0.05
 LARGEST_TIP, SMALLEST_TIP = 0.25, 1e-4
 #: Samples of a mesh at which tips are pressed.
 SAMPLES = 1_000
-#: If only a part of it is to be grasped.
-OF_A_PART = 4_000
-#: Of any two grasps at least one contact differs by this share of the object's radius.
-APART = 0.15
 #: Rows of the kernels: a place's point, normal, share of the pad that is off, that bears, steady.
 POINT, NORMAL, OFF, BEARING, STEADY = slice(0, 3), slice(3, 6), 6, 7, 8
 
@@ -259,20 +253,6 @@ def places(mesh: TriangleMesh, radius: float, seed: int, samples: int = SAMPLES)
     return mesh.core.map(radius, random.random((samples, 3)))
 
 
-class Pressed(NamedTuple):
-    """A grasp found on a mesh, in the object's own coordinates, and what the mesh says of it."""
-
-    contacts: Floats
-    normals: Floats
-    checks: tuple[ContactCheck, ...]
-    #: Q_l with the normals of the triangles where the contacts are.
-    exact_quality: float
-    #: Share of errors of aim under which the grasp is force closure.
-    held: float
-    #: Q_l that nine of ten of these reach.
-    low_quality: float
-
-
 @dataclass(frozen=True, eq=False)
 class ContactCheck(Value):
     """What the mesh, or the points of a scan, say of a contact of a grasp."""
@@ -290,83 +270,3 @@ class ContactCheck(Value):
     clearance: float
     #: Share of the pad that bears, or that has points under it; NaN where there are none.
     bearing: float
-
-
-class Search(NamedTuple):
-    """What grasps are looked for."""
-
-    hand: Cone
-    #: Centre of mass and length scale, in the object's unit.
-    center_of_mass: Floats
-    length_scale: float
-    contacts: int
-    top: int
-    #: Errors of aim, in the object's unit.
-    errors: float
-
-
-def search(
-    mesh: TriangleMesh,
-    radius: float,
-    seed: int,
-    wanted: Search,
-    within: Callable[[Floats], NDArray[np.bool_]] | None = None,
-) -> list[Pressed]:
-    """Different grasps of the mesh, true ones by exact normals, by balls and under bad aim.
-
-    Fingers start where ``within`` is true of their contacts, if it is given.
-    """
-    if within is None:
-        rows = places(mesh, radius, seed)
-    else:
-        rows = places(mesh, radius, seed, OF_A_PART)
-        rows = np.ascontiguousarray(rows[within(mesh.back(rows[:, POINT]))][:SAMPLES])
-    if len(rows) < wanted.contacts:
-        return []
-    found = mesh.core.grasps(radius, rows, _request(mesh, wanted), cores())
-    return [_pressed(mesh, one) for one in found]
-
-
-def press(
-    mesh: TriangleMesh, radius: float, contacts: Floats, normals: Floats, wanted: Search
-) -> Pressed | None:
-    """A grasp pressed on the mesh near given contacts and climbed there; None if it is lost."""
-    ways = np.ascontiguousarray(normals)
-    aims = mesh.local(contacts)
-    near = mesh.core.nearest(aims)
-    rows = mesh.core.settle(radius, near, ways)
-    if np.isnan(rows).any():
-        return None
-    found = mesh.core.climb(radius, rows, _request(mesh, wanted))
-    return None if found is None else _pressed(mesh, found)
-
-
-def _request(mesh: TriangleMesh, wanted: Search) -> Any:
-    x, y, z = mesh.local(wanted.center_of_mass).tolist()
-    mu, edges, torsion, each = wanted.hand
-    return (
-        # Torsion is a length: the kernels divide lengths by the length scale.
-        (mu, edges, torsion / wanted.length_scale, each),
-        (x, y, z),
-        mesh.size / wanted.length_scale,
-        wanted.contacts,
-        wanted.top,
-        APART * wanted.length_scale / mesh.size,
-        wanted.errors / mesh.size,
-    )
-
-
-def _pressed(mesh: TriangleMesh, found: tuple[Floats, list[float], Floats]) -> Pressed:
-    rows, (_, exact, _, held, low), contacts = found
-    checks = tuple(
-        ContactCheck(
-            distance=float(distance * mesh.size),
-            angle=float(np.arccos(min(1.0, cosine))),
-            seen=True,
-            clearance=float(clearance * mesh.size),
-            bearing=float(bearing),
-        )
-        for (distance, cosine, clearance), bearing in zip(contacts, rows[:, BEARING], strict=True)
-    )
-    normals = np.ascontiguousarray(rows[:, NORMAL])
-    return Pressed(mesh.back(rows[:, POINT]), normals, checks, exact, held, low)

@@ -18,8 +18,10 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 mod board;
+mod together;
 
 use board::{Board, Leave, Running};
+pub use together::Together;
 
 const WORDS: usize = 4;
 /// One bit per direction.
@@ -57,6 +59,32 @@ pub fn best_subsets(
     size: usize,
     top: usize,
     threads: usize,
+    progress: impl FnMut(u64, u64) -> ControlFlow<()>,
+) -> Result<Vec<Ranked>, Error> {
+    best_subsets_together(
+        contacts,
+        frictions,
+        center_of_mass,
+        cone,
+        size,
+        top,
+        threads,
+        None,
+        progress,
+    )
+}
+
+/// The same among those subsets of which all pairs may be `together`.
+#[expect(clippy::too_many_arguments, reason = "what to search among, and how")]
+pub fn best_subsets_together(
+    contacts: &[Contact],
+    frictions: &[f64],
+    center_of_mass: DVec3,
+    cone: &FrictionCone,
+    size: usize,
+    top: usize,
+    threads: usize,
+    together: Option<&Together>,
     mut progress: impl FnMut(u64, u64) -> ControlFlow<()>,
 ) -> Result<Vec<Ranked>, Error> {
     let n = contacts.len();
@@ -73,6 +101,7 @@ pub fn best_subsets(
     }
     let board = Board::new(top);
     let mut first = Worker::new(contacts, frictions, center_of_mass, cone, size, &board);
+    first.together = together;
     first.seed(total);
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
@@ -155,6 +184,8 @@ struct Worker<'a> {
     center: DVec3,
     board: &'a Board,
     evaluator: Evaluator,
+    /// Which contacts may be in a grasp together; all, if not given.
+    together: Option<&'a Together>,
     /// Contacts per grasp, and those of the grasp that is evaluated.
     size: usize,
     grasp: Vec<Contact>,
@@ -211,6 +242,7 @@ impl<'a> Worker<'a> {
             center,
             board,
             evaluator: Evaluator::new(cone),
+            together: None,
             size,
             grasp: Vec::new(),
             grasp_frictions: Vec::new(),
@@ -276,6 +308,9 @@ impl<'a> Worker<'a> {
                 if stop.load(Ordering::Relaxed) {
                     return;
                 }
+                if !self.fits(chosen, next) {
+                    continue;
+                }
                 chosen.push(next);
                 self.all_from(chosen, stop);
                 chosen.pop();
@@ -284,19 +319,35 @@ impl<'a> Worker<'a> {
         }
         let mut next = last + 1;
         loop {
+            next = match self.together {
+                Some(together) => together.next(chosen, next).unwrap_or(n),
+                None => next,
+            };
+            let fitting = next;
             // A new threshold or direction changes the masks: look at them afresh each time.
             next = match self.norm {
                 Norm::Sum => first_open(&self.common(chosen), &self.masks, next),
                 Norm::Each => (next..n).find(|&k| self.reaches(chosen, k)).unwrap_or(n),
             };
-            if next == n {
+            if next >= n {
                 break;
+            }
+            if next > fitting && !self.fits(chosen, next) {
+                continue;
             }
             chosen.push(next);
             self.evaluate(chosen);
             chosen.pop();
             next += 1;
         }
+    }
+
+    /// May another contact be with all of the chosen ones?
+    fn fits(&self, chosen: &[usize], another: usize) -> bool {
+        let Some(together) = self.together else {
+            return true;
+        };
+        chosen.iter().all(|&k| together.allows(k, another))
     }
 
     /// Directions in which all these contacts stay below the threshold.
@@ -330,7 +381,9 @@ impl<'a> Worker<'a> {
     /// Q of some contacts if it reaches the threshold, else 0; tells the board. Sorts them.
     fn evaluate(&mut self, indices: &mut [usize]) -> f64 {
         indices.sort_unstable();
-        if indices.windows(2).any(|pair| pair[0] == pair[1]) {
+        if indices.windows(2).any(|pair| pair[0] == pair[1])
+            || self.together.is_some_and(|pairs| !pairs.allow_all(indices))
+        {
             return 0.0;
         }
         if self.board.threshold() > self.threshold {

@@ -64,6 +64,9 @@ pub fn polish(
                     continue;
                 }
                 let trial = with(&at, finger, new);
+                if !wanted.allow_one(&trial, finger) {
+                    continue;
+                }
                 if let Some(quality) = wanted.better(evaluator, &trial, best) {
                     (best, at) = (quality, trial);
                 }

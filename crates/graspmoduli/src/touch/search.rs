@@ -3,13 +3,13 @@
 use super::gate::{self, Checked};
 use super::map::Place;
 use super::mesh::Mesh;
-use super::polish::{self, polish};
+use super::polish::polish;
 use super::press::Tip;
 use super::wanted::Wanted;
 use crate::error::Error;
 use crate::parallel::*;
 use crate::quality::Evaluator;
-use crate::search::best_subsets;
+use crate::search::{Together, best_subsets_together};
 use glam::DVec3;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,6 +20,9 @@ const LIMITS: [f64; 6] = [0.0, 0.1, 0.2, 0.35, 0.5, 1.0];
 const SHARE: f64 = 0.8;
 /// About so many subsets are searched.
 const SUBSETS: u64 = 170_000;
+/// Of so many places at most; and where few pairs may be together.
+const PLACES: usize = 100;
+const MOST_PLACES: usize = 400;
 /// Neighbours of a place on the map.
 const NEIGHBOURS: usize = 16;
 /// Fewer steady places than this are not enough to choose among.
@@ -53,6 +56,8 @@ pub fn grasps(
     threads: usize,
     stop: &AtomicBool,
 ) -> Result<Vec<Found>, Error> {
+    let allowed = |place: &&Place| wanted.limits.allows(place.point, place.normal);
+    let map: &[Place] = &map.iter().filter(allowed).copied().collect::<Vec<_>>();
     let steady: Vec<_> = map.iter().copied().filter(|place| place.steady).collect();
     if steady.len() >= map.len() {
         return true_grasps(mesh, tip, map, wanted, threads, stop);
@@ -127,7 +132,7 @@ fn candidates(
     threads: usize,
     stop: &AtomicBool,
 ) -> Result<Vec<Vec<Place>>, Error> {
-    let spread = farthest(map, wanted.fingers);
+    let (spread, together) = farthest(map, wanted);
     let contacts: Vec<_> = spread
         .iter()
         .map(|&k| wanted.contact(map[k].point, map[k].normal))
@@ -143,7 +148,7 @@ fn candidates(
                 ControlFlow::Continue(())
             }
         };
-        let ranked = best_subsets(
+        let ranked = best_subsets_together(
             &contacts,
             &[],
             DVec3::ZERO,
@@ -151,6 +156,7 @@ fn candidates(
             wanted.fingers,
             many * wanted.top.max(5),
             threads,
+            together.as_ref(),
             heed,
         )?;
         let grasps = ranked
@@ -208,12 +214,41 @@ fn different(
     kept
 }
 
-/// So many places that all their subsets can be searched, each the farthest from those before it.
-fn farthest(map: &[Place], fingers: usize) -> Vec<usize> {
-    let mut most = fingers;
-    while most < 100 && subsets(most + 1, fingers) <= SUBSETS {
-        most += 1;
+/// So many places that all their subsets can be searched, each the farthest from those before it;
+/// and, if that matters, which of them fingers may press at together.
+fn farthest(map: &[Place], wanted: &Wanted<'_>) -> (Vec<usize>, Option<Together>) {
+    let fingers = wanted.fingers;
+    let most_of = |share: f64, limit: usize| {
+        // Where few pairs may be together, so may few subsets, and more places can be searched. Of
+        // a triple two pairs count: near places have the same neighbours.
+        let pairs = fingers.saturating_sub(1) as i32;
+        let allowed = |n: usize| subsets(n, fingers) as f64 * share.powi(pairs);
+        let mut most = fingers;
+        while most < limit && allowed(most + 1) <= SUBSETS as f64 {
+            most += 1;
+        }
+        most
+    };
+    let chosen = spread(map, most_of(1.0, PLACES));
+    if !wanted.limits.pairs_matter() {
+        return (chosen, None);
     }
+    let together = |chosen: &[usize]| {
+        Together::new(chosen.len(), |i, j| {
+            let [one, other] = [i, j].map(|k| map[chosen[k]]);
+            let limits = wanted.limits;
+            limits.allows_pair((one.point, one.normal), (other.point, other.normal))
+        })
+    };
+    let pairs = together(&chosen).pairs() as f64;
+    let share = pairs / subsets(chosen.len(), 2).max(1) as f64;
+    let chosen = spread(map, most_of(share.max(1e-3), MOST_PLACES));
+    let pairs = together(&chosen);
+    (chosen, Some(pairs))
+}
+
+/// Indices of places, each the farthest from those before it.
+fn spread(map: &[Place], most: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     // Opposite sides of a thin wall are different places.
     let mut away = vec![f64::INFINITY; map.len()];
@@ -234,6 +269,9 @@ fn farthest(map: &[Place], fingers: usize) -> Vec<usize> {
 }
 
 fn subsets(n: usize, m: usize) -> u64 {
+    if m > n {
+        return 0;
+    }
     (0..m as u64).fold(1, |product, k| product * (n as u64 - k) / (k + 1))
 }
 
@@ -298,7 +336,9 @@ fn climb(
                 let Some(quality) = wanted.better(evaluator, &places, best) else {
                     continue;
                 };
-                if others.iter().all(|other| wanted.differ(&places, other)) {
+                if wanted.allow_one(&places, finger)
+                    && others.iter().all(|other| wanted.differ(&places, other))
+                {
                     best = quality;
                     step = Some(trial);
                 }
@@ -343,7 +383,7 @@ fn checked(
     stop: &AtomicBool,
 ) -> Result<Vec<Found>, Error> {
     let mut kept: Vec<Found> = Vec::new();
-    for rounds in [polish::ROUNDS, 0] {
+    for rounds in [wanted.rounds, 0] {
         let found: Vec<_> = candidates
             .par_iter()
             .map(|grasp| {
@@ -390,6 +430,10 @@ pub fn climbed(
     let mut evaluator = Evaluator::new(wanted.cone);
     let polished = polish(mesh, tip, grasp, limit, rounds, wanted, &mut evaluator);
     [polished, grasp.to_vec()].into_iter().find_map(|places| {
+        // A grasp that is brought here from elsewhere need not be allowed.
+        if !wanted.allow(&places) {
+            return None;
+        }
         let quality = wanted.quality(&mut evaluator, &places);
         let checked = gate::check(mesh, tip, &places, quality, wanted, &mut evaluator)?;
         Some(Found {

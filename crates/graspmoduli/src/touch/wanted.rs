@@ -2,6 +2,7 @@
 
 use super::map::Place;
 use crate::contact::{Contact, FrictionCone};
+use crate::limits::Limits;
 use crate::quality::Evaluator;
 use glam::DVec3;
 
@@ -25,6 +26,10 @@ pub struct Wanted<'a> {
     pub apart: f64,
     /// Errors of aim, a length, under which grasps are tried.
     pub errors: f64,
+    /// Rounds of the ascent on the mesh itself.
+    pub rounds: usize,
+    /// Where fingers may go.
+    pub limits: &'a Limits,
 }
 
 impl Wanted<'_> {
@@ -60,6 +65,16 @@ impl Wanted<'_> {
         (quality > bar).then_some(quality)
     }
 
+    /// May fingers press at places together?
+    pub(crate) fn allow(&self, places: &[Place]) -> bool {
+        self.limits.allow(&pressed(places))
+    }
+
+    /// May one of the fingers be where it is, if the others may?
+    pub(crate) fn allow_one(&self, places: &[Place], finger: usize) -> bool {
+        self.limits.allow_one(&pressed(places), finger)
+    }
+
     /// How many grasps are polished.
     pub(crate) fn candidates(&self) -> usize {
         2 * self.top + 2
@@ -69,6 +84,10 @@ impl Wanted<'_> {
     pub(crate) fn differ(&self, one: &[Place], other: &[Place]) -> bool {
         !matched(one, other, self.apart, &mut vec![false; other.len()])
     }
+}
+
+fn pressed(places: &[Place]) -> Vec<(DVec3, DVec3)> {
+    places.iter().map(|p| (p.point, p.normal)).collect()
 }
 
 /// Can contacts be paired so that no pair is `apart`?

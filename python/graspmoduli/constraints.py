@@ -1,0 +1,374 @@
+"""Where fingers may go, without knowing the hand: openings, approaches, tables, regions, loads."""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from ._arrays import Floats, a_callback, a_path, brief, floats, number, numbers, vectors
+from ._core import GraspModuliError
+from ._files import read_toml
+from ._values import Value
+from .tasks import gravity, task_quality
+
+#: Constraints are met with this to spare, over the object's size: rounding breaks none.
+SPARE = 1e-9
+#: A fingertip keeps clear of obstacles on the last part of its way, so many of its radii.
+WAY = 4.0
+
+Booleans = NDArray[np.bool_]
+#: A box or half-space as the kernels take it: is it a box, and its corners or point and normal.
+Vector = tuple[float, float, float]
+Zone = tuple[bool, Vector, Vector]
+
+
+class NoGraspLeftError(GraspModuliError):
+    """Constraints that leave no grasp of an object that has some: it names the one that does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints(Value):
+    """Where fingers may go and what they must hold, in the object's coordinates and unit.
+
+    All are kept while grasps are searched for and improved, and by every grasp that comes back.
+    Those that are not given ask for nothing.
+
+    A *zone* is a box, ``{"low": (x, y, z), "high": (x, y, z)}`` or just such a pair of corners,
+    open where a number is infinite; or a half-space, ``{"point": (x, y, z), "normal": (x, y, z)}``:
+    all that lies behind the plane, on the side from which the normal points away. A *region* is a
+    zone, a part of an object (:func:`fit_parts`), or a function of points (n, 3) that says for each
+    whether it lies in it, (n,).
+
+    Raises
+    ------
+    GraspModuliError
+        If one of them is wrong or contradicts itself.
+
+    Examples
+    --------
+    Two pads of a jaw that opens 85 mm and comes from above.
+
+    >>> import numpy as np, graspmoduli as gm
+    >>> jaw = gm.Constraints(opening=(0.0, 0.085), approach=((0, 0, -1), np.pi / 2))
+    >>> across = np.array([[0.04, 0, 0], [-0.04, 0, 0]])
+    >>> jaw.allow(across, np.array([[-1.0, 0, 0], [1.0, 0, 0]]))
+    True
+    >>> jaw.allow(1.5 * across, np.array([[-1.0, 0, 0], [1.0, 0, 0]]))
+    False
+    """
+
+    #: Least and largest distance between any two contacts.
+    opening: tuple[float, float] | None = None
+    #: Least gap between any two fingertips.
+    gap: float | None = None
+    #: A direction in which the hand comes, and the largest angle between it and the way along which
+    #: a finger presses, the contact's normal: with ((0, 0, -1), π/2) no finger presses upwards.
+    approach: tuple[Any, float] | None = None
+    #: A point of the table and its normal, which points to the object's side: fingertips stay clear
+    #: of it, where they press and on the last four radii of their way.
+    table: tuple[Any, Any] | None = None
+    #: Zones of which fingertips stay clear in the same way.
+    forbidden: Sequence[Any] = ()
+    #: Regions: every contact lies in one of them, if there are any, ...
+    wanted: Sequence[Any] = ()
+    #: ... and in none of these.
+    unwanted: Sequence[Any] = ()
+    #: The object's centre of mass where it is known. Shape (3,).
+    center_of_mass: Any = None
+    #: A mass that is carried [kg], in any direction of gravity ...
+    payload: float | None = None
+    #: ... by normal forces of this size [N]: their sum, or each with ``norm="each"``.
+    force: float | None = None
+    #: A function of contacts and normals, (m, 3) each, that says whether the grasp will do.
+    accept: Callable[[Floats, Floats], Any] | None = None
+
+    def __post_init__(self) -> None:
+        self._keep("opening", _opening(self.opening))
+        if self.gap is not None:
+            self._keep("gap", _at_least_zero("gap", self.gap))
+        self._keep("approach", _approach(self.approach))
+        self._keep("table", None if self.table is None else _table(self.table))
+        for name in ("forbidden", "wanted", "unwanted"):
+            self._keep(name, _regions(name, getattr(self, name)))
+        if self.center_of_mass is not None:
+            self._keep("center_of_mass", _vector("center_of_mass", self.center_of_mass))
+        for name in ("payload", "force"):
+            if getattr(self, name) is not None:
+                self._keep(name, number(name, getattr(self, name), positive=True))
+        if (self.payload is None) != (self.force is None):
+            one, other = ("payload", "force")[:: 1 if self.force is None else -1]
+            raise GraspModuliError(f"{other} must be given with {one}, got none")
+        a_callback("accept", self.accept)
+
+    def _keep(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Constraints:
+        """From a TOML file with the same names: tables of ``direction`` and ``half_angle`` for the
+        approach, of ``point`` and ``normal`` for the table and half-spaces, of ``low`` and ``high``
+        for boxes; see docs/constraints.md."""
+        return cls.of(read_toml("constraints", a_path(path)), f"constraints in {os.fspath(path)}")
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], where: str = "constraints") -> Constraints:
+        """From names and values, as a TOML file holds them."""
+        known = [field.name for field in fields(cls) if field.name != "accept"]
+        for name in values:
+            if name not in known:
+                raise GraspModuliError(f"{where} must be of {', '.join(known)}, got {brief(name)}")
+        given = dict(values)
+        for name, (one, other) in PAIRS.items():
+            pair = given.get(name)
+            if isinstance(pair, Mapping):
+                if set(pair) != {one, other}:
+                    raise GraspModuliError(f"{name} must have {one} and {other}, got {brief(pair)}")
+                given[name] = (pair[one], pair[other])
+        return cls(**given)
+
+    def allow(self, contacts: ArrayLike, normals: ArrayLike, *, tip_radius: float = 0.0) -> bool:
+        """May fingers press there together, (m, 3) each, with tips of that radius?
+
+        The payload is not asked for: it takes a whole grasp.
+        """
+        points = np.ascontiguousarray(vectors("contacts", contacts, "(m, 3)"))
+        ways = np.ascontiguousarray(vectors("normals", normals, "(m, 3)"))
+        if points.ndim != 2 or points.shape != ways.shape:
+            raise GraspModuliError(
+                f"contacts and normals must have shape (m, 3), got {points.shape} and {ways.shape}"
+            )
+        limits = self.limits(_at_least_zero("tip_radius", tip_radius), spare=0.0)
+        pairs = _core.pairs_allowed(limits, points, ways)
+        return (
+            bool(self.places(points, ways, limits).all())
+            and bool((pairs | np.eye(len(points), dtype=np.bool_)).all())
+            and (self.accept is None or bool(self.accept(points, ways)))
+        )
+
+    def places(self, contacts: Floats, normals: Floats, limits: Any) -> Booleans:
+        """Where single fingers may press: points and normals (n, 3), :meth:`limits` of both."""
+        points = np.ascontiguousarray(contacts)
+        allowed = _core.places_allowed(limits, points, np.ascontiguousarray(normals))
+        # Zones have been asked: of several regions one is enough.
+        if any(not isinstance(region, tuple) for region in self.wanted):
+            allowed &= np.any([_inside("wanted", one, points) for one in self.wanted], axis=0)
+        for region in self.unwanted:
+            if not isinstance(region, tuple):
+                allowed &= ~_inside("unwanted", region, points)
+        return allowed
+
+    def hold(self, grasp: Any) -> bool:
+        """Does a grasp hold the payload, whatever the direction of gravity, with the force?"""
+        if self.payload is None or self.force is None:
+            return True
+        return self.force * task_quality(grasp, task=gravity(self.payload)) >= 1.0
+
+    @property
+    def after_search(self) -> bool:
+        """Is there a question that only Python answers?"""
+        regions = (*self.wanted, *self.unwanted)
+        return (
+            self.accept is not None
+            or self.payload is not None
+            or any(not isinstance(region, tuple) for region in regions)
+        )
+
+    @property
+    def given(self) -> list[str]:
+        """The names of those that are given, but for the centre of mass."""
+        skipped = ("center_of_mass", "force")
+        own = [field.name for field in fields(self) if field.name not in skipped]
+        # Zones are tuples of arrays' lists, and so compare.
+        return [name for name in own if getattr(self, name) not in (None, ())]
+
+    def without(self, name: str) -> Constraints:
+        """The others."""
+        if name == "payload":
+            return replace(self, payload=None, force=None)
+        return replace(self, **{name: () if name in ("forbidden", "wanted", "unwanted") else None})
+
+    def only(self, name: str) -> Constraints:
+        """This one alone."""
+        others = (other for other in self.given if other != name)
+        return functools.reduce(Constraints.without, others, self)
+
+    def limits(
+        self,
+        tip_radius: float,
+        middle: Floats | None = None,
+        size: float = 1.0,
+        spare: float = SPARE,
+    ) -> Any:
+        """As the kernels take them, for an object whose ``middle`` is moved to 0 and that is
+        divided by ``size``."""
+        at = np.zeros(3) if middle is None else middle
+        low, high = (0.0, math.inf) if self.opening is None else self.opening
+        radius = tip_radius / size
+        table = [] if self.table is None else [(False, *self.table)]
+        approach = None
+        if self.approach is not None:
+            direction, angle = self.approach
+            approach = (direction, math.cos(angle) + spare if angle < math.pi else -2.0)
+        own = [region for region in self.wanted if isinstance(region, tuple)]
+        return (
+            [low / size + spare if low > 0.0 else 0.0, high / size - spare],
+            0.0 if self.gap is None else 2.0 * radius + self.gap / size + spare,
+            radius,
+            WAY * radius,
+            approach,
+            [_moved(zone, at, size, spare) for zone in (*self.forbidden, *table)],
+            # Beside regions that only Python knows, zones are asked there.
+            [_moved(zone, at, size, -spare) for zone in own]
+            if len(own) == len(self.wanted)
+            else [],
+            [_moved(zone, at, size, spare) for zone in self.unwanted if isinstance(zone, tuple)],
+        )
+
+
+def a_constraint(name: str, value: Any) -> Constraints:
+    """``value`` if it is constraints; none if not given."""
+    if value is None:
+        return Constraints()
+    if not isinstance(value, Constraints):
+        raise GraspModuliError(f"{name} must be a gm.Constraints, got {brief(value)}")
+    return value
+
+
+#: Values of two parts, and what tables of a TOML file call them.
+PAIRS = {"approach": ("direction", "half_angle"), "table": ("point", "normal")}
+
+
+def _opening(value: Any) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    pair = numbers("opening", value)
+    if pair.shape != (2,) or not 0.0 <= pair[0] < pair[1]:
+        raise GraspModuliError(
+            f"opening must be a least distance and a larger one, 0 or positive, got {brief(value)}"
+        )
+    return float(pair[0]), float(pair[1])
+
+
+def _approach(value: Any) -> tuple[Vector, float] | None:
+    if value is None:
+        return None
+    direction, angle = _two("approach", value, "a direction (3,) and a half-angle")
+    half = number("approach's half-angle", angle, positive=True)
+    if half > math.pi:
+        raise GraspModuliError(f"approach's half-angle must be at most π, got {half:g}")
+    return _unit("approach's direction", direction), half
+
+
+def _table(value: Any) -> tuple[Vector, Vector]:
+    point, normal = _two("table", value, "a point (3,) and a normal (3,)")
+    return _vector("table's point", point), _unit("table's normal", normal)
+
+
+def _two(name: str, value: Any, wanted: str) -> tuple[Any, Any]:
+    try:
+        one, other = value
+    except (TypeError, ValueError):
+        raise GraspModuliError(f"{name} must be {wanted}, got {brief(value)}") from None
+    return one, other
+
+
+def _at_least_zero(name: str, value: Any) -> float:
+    found = number(name, value)
+    if found < 0.0:
+        raise GraspModuliError(f"{name} must be 0 or positive, got {found:g}")
+    return found
+
+
+def _vector(name: str, value: Any) -> Vector:
+    array = floats(name, value)
+    if array.shape != (3,):
+        raise GraspModuliError(f"{name} must have shape (3,), got {array.shape}")
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _unit(name: str, value: Any) -> Vector:
+    vector = np.array(_vector(name, value))
+    largest = float(np.abs(vector).max())
+    if largest == 0.0:
+        raise GraspModuliError(f"{name} must not be 0, got {brief(value)}")
+    vector /= largest
+    x, y, z = (vector / math.sqrt(float((vector * vector).sum()))).tolist()
+    return x, y, z
+
+
+def _regions(name: str, value: Any) -> tuple[Any, ...]:
+    if isinstance(value, Mapping) or callable(value) or hasattr(value, "contains"):
+        value = [value]
+    try:
+        given = list(value)
+    except TypeError:
+        raise GraspModuliError(
+            f"{name} must be a list of {WANTED[name]}, got {brief(value)}"
+        ) from None
+    return tuple(_region(name, one) for one in given)
+
+
+WANTED = {
+    "forbidden": "boxes and half-spaces",
+    "wanted": "regions",
+    "unwanted": "regions",
+}
+
+
+def _region(name: str, value: Any) -> Any:
+    if name != "forbidden" and (callable(value) or hasattr(value, "contains")):
+        return value
+    if isinstance(value, Mapping):
+        if set(value) == {"point", "normal"}:
+            point = _vector(f"{name}'s point", value["point"])
+            return (False, point, _unit(f"{name}'s normal", value["normal"]))
+        if set(value) != {"low", "high"}:
+            raise GraspModuliError(
+                f"{name} must have low and high, or point and normal, got {brief(dict(value))}"
+            )
+        pair: Any = (value["low"], value["high"])
+    elif isinstance(value, tuple) and len(value) == 3 and isinstance(value[0], bool):
+        return value
+    else:
+        pair = _two(name, value, "boxes (low, high) or tables of point and normal")
+    low, high = (numbers(f"{name}'s box", corner) for corner in pair)
+    if low.shape != (3,) or high.shape != (3,) or not (low < high).all():
+        raise GraspModuliError(
+            f"{name} must be boxes of a lower and a higher corner, (3,) each, got {brief(value)}"
+        )
+    return (True, tuple(low.tolist()), tuple(high.tolist()))
+
+
+def _moved(zone: Zone, middle: Floats, size: float, spare: float) -> Zone:
+    """In the kernels' coordinates, larger by ``spare``."""
+    is_box, one, other = zone
+    if is_box:
+        low, high = ((np.array(corner) - middle) / size for corner in (one, other))
+        return True, tuple((low - spare).tolist()), tuple((high + spare).tolist())
+    point = (np.array(one) - middle) / size + spare * np.array(other)
+    return False, tuple(point.tolist()), other
+
+
+def _inside(name: str, region: Any, points: Floats) -> Booleans:
+    """Do points lie in a region?"""
+    if isinstance(region, tuple):
+        is_box, one, other = region
+        if is_box:
+            return ((points >= one) & (points <= other)).all(axis=1)
+        return ((points - one) * other).sum(axis=1) <= 0.0
+    answer = np.asarray(region.contains(points) if hasattr(region, "contains") else region(points))
+    if answer.dtype != np.bool_ or answer.shape != (len(points),):
+        raise GraspModuliError(
+            f"{name} must say for each of {len(points)} points whether it lies in the region, got "
+            f"an answer of type {answer.dtype} and shape {answer.shape}"
+        )
+    return answer
