@@ -28,6 +28,7 @@ object, normals point into it.
 """
 
 from . import shapes as shapes
+from ._arrays import NoGraspLeftError as NoGraspLeftError
 from ._batches import GraspLike as GraspLike
 from ._batches import contact_frames as contact_frames
 from ._core import GraspModuliError as GraspModuliError
@@ -36,7 +37,6 @@ from .configurations import Configurations as Configurations
 from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
 from .constraints import Constraints as Constraints
-from .constraints import NoGraspLeftError as NoGraspLeftError
 from .epsilon import Epsilon as Epsilon
 from .epsilon import epsilon as epsilon
 from .grasps import Grasp as Grasp

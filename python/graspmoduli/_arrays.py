@@ -23,6 +23,10 @@ MOST_EDGES = 2**12
 MOST_FRICTION = 1e6
 
 
+class NoGraspLeftError(GraspModuliError):
+    """Constraints that leave no grasp of an object that has some: it names the one that does."""
+
+
 def floats(name: str, value: Any) -> Floats:
     """``value`` as a contiguous float64 array of finite numbers."""
     return finite(name, numbers(name, value))

@@ -30,10 +30,6 @@ Vector = tuple[float, float, float]
 Zone = tuple[bool, Vector, Vector]
 
 
-class NoGraspLeftError(GraspModuliError):
-    """Constraints that leave no grasp of an object that has some: it names the one that does."""
-
-
 @dataclass(frozen=True, eq=False)
 class Constraints(Value):
     """Where fingers may go and what they must hold, in the object's coordinates and unit.

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from .. import _signals
+from .._arrays import NoGraspLeftError
 from .._core import GraspModuliError
 from .grasp import grasp
 from .reproduce import reproduce
@@ -56,7 +57,8 @@ def _run(arguments: list[str]) -> int:
     except typer.Exit as end:
         code = end.exit_code
     except GraspModuliError as error:
-        return _fail(str(error))
+        # That there is no grasp is an answer, not a wrong question.
+        return _fail(str(error), 1 if isinstance(error, NoGraspLeftError) else 2)
     except MemoryError:
         return _fail("object and options must fit into memory, got too little of it")
     except OSError as error:
@@ -75,10 +77,10 @@ def _run(arguments: list[str]) -> int:
     return code
 
 
-def _fail(message: str) -> int:
+def _fail(message: str, code: int = 2) -> int:
     # A file's name may hold ends of lines.
     _signals.say(" ".join(message.splitlines()))
-    return 2
+    return code
 
 
 def _no_output(error: OSError) -> int:

@@ -12,9 +12,14 @@ from .. import _arrays, _signals
 from .._batches import NORMS, is_each
 from .console import check_outputs, number, progress_bar, warnings_said, write
 from .pipeline import (
+    Approach,
     Camera,
+    ConstraintsFile,
     KeepTable,
     ObjectNumber,
+    Opening,
+    Table,
+    constraints_of,
     find_grasps,
     image_of,
     scan_options,
@@ -72,6 +77,10 @@ def grasp(
             metavar="E", help="Errors of aim, a distance: rank by the quality that they leave."
         ),
     ] = None,
+    opening: Opening = None,
+    table: Table = None,
+    approach: Approach = None,
+    constraints: ConstraintsFile = None,
     camera: Camera = None,
     object_number: ObjectNumber = None,
     keep_table: KeepTable = False,
@@ -100,6 +109,7 @@ def grasp(
     if center_of_mass is not None:
         center = [number("center_of_mass", text, float) for text in center_of_mass]
         options["center_of_mass"] = _arrays.floats("center_of_mass", center)
+    options["constraints"] = constraints_of(constraints, opening, table, approach)
     scan = scan_options(camera, object_number, keep_table)
     # Outputs that cannot be written are found out before the work; all are written at its end.
     check_outputs(thing, json=json_file, picture=picture)

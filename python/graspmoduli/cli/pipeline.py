@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import logging
 import warnings
@@ -24,6 +25,54 @@ ObjectNumber = Annotated[
 KeepTable = Annotated[
     bool, typer.Option("--keep-table", help="The plane of a scan belongs to the object.")
 ]
+
+Opening = Annotated[
+    tuple[str, str] | None,
+    typer.Option(metavar="MIN MAX", help="Least and largest distance between any two fingers."),
+]
+Table = Annotated[
+    tuple[str, str, str, str, str, str] | None,
+    typer.Option(
+        metavar="X Y Z NX NY NZ",
+        help="A point of the table and its normal, which points to OBJECT: fingers stay clear.",
+    ),
+]
+Approach = Annotated[
+    tuple[str, str, str, str] | None,
+    typer.Option(
+        metavar="X Y Z A",
+        help="No finger presses at more than the angle A, in radians, from this direction.",
+    ),
+]
+ConstraintsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--constraints", metavar="FILE", help="Where fingers may go: TOML, docs/constraints.md."
+    ),
+]
+
+
+def constraints_of(
+    path: Path | None,
+    opening: tuple[str, str] | None,
+    table: tuple[str, ...] | None,
+    approach: tuple[str, ...] | None,
+) -> Any:
+    """What the options ask of fingers; they take the place of what the file says."""
+    from ..constraints import Constraints
+
+    given: dict[str, Any] = {}
+    if opening is not None:
+        given["opening"] = tuple(number("opening", text, float) for text in opening)
+    if table is not None:
+        values = [number("table", text, float) for text in table]
+        given["table"] = (values[:3], values[3:])
+    if approach is not None:
+        values = [number("approach", text, float) for text in approach]
+        given["approach"] = (values[:3], values[3])
+    if path is None:
+        return Constraints(**given)
+    return dataclasses.replace(Constraints.load(path), **given)
 
 
 def scan_options(

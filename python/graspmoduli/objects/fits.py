@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Floats, brief, count, finite, floats, locked, number
+from .._arrays import Floats, NoGraspLeftError, brief, count, finite, floats, locked, number
 from .._batches import NORMS, Cone, fingers
 from .._core import GraspModuliError
-from ..constraints import Constraints, NoGraspLeftError, a_constraint
+from ..constraints import Constraints, a_constraint
 from ..grasps import Grasp
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
 from ..transfers import transfer

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._arrays import Floats, cores
+from .._arrays import Floats, NoGraspLeftError, cores
 from .._batches import Cone
-from ..constraints import Constraints, NoGraspLeftError
+from ..constraints import Constraints
 from .touching import BEARING, NORMAL, POINT, SAMPLES, ContactCheck, TriangleMesh, places
 
 #: Samples of a mesh if only a part of it is to be grasped, or few places are allowed; and if even
