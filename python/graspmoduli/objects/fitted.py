@@ -94,6 +94,12 @@ class Fitted(Value):
         column = np.floor(angle / (2 * np.pi) * columns).astype(np.int64) % columns
         return near & self.allowed[row, column]
 
+    def contains(self, points: ArrayLike) -> Booleans:
+        """Which points, (n, 3) in the object's coordinates, lie on the surface where it explains
+        the object: to within 2 % of the object's size. Shape (n,)."""
+        given = finite("points", vectors("points", points, "(n, 3)"))
+        return self._is_on(given.reshape(-1, 3))
+
     def in_object(self, grasp: Grasp, *, friction: ArrayLike = 1.0, edges: int = 8) -> ObjectGrasp:
         """A grasp on the fitted surface, in the object's own coordinates."""
         a_grasp("grasp", grasp)
