@@ -3,7 +3,7 @@
 =====================  ======================================================================
 grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
-given wrenches         :func:`quality_of_wrenches`
+given wrenches         :func:`quality_of_wrenches`; soft fingers: :func:`pad_torsion`
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench;
                        :func:`contact_frames`
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
@@ -70,6 +70,7 @@ from .quality import Extreme as Extreme
 from .quality import QualityGradient as QualityGradient
 from .quality import circular_quality as circular_quality
 from .quality import largest_quality as largest_quality
+from .quality import pad_torsion as pad_torsion
 from .quality import quality as quality
 from .quality import quality_at_least as quality_at_least
 from .quality import quality_gradient as quality_gradient

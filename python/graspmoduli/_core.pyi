@@ -104,6 +104,18 @@ def best_subsets(
     threads: int,
     progress: Callable[[int, int], object] | None,
 ) -> list[tuple[list[int], float]]: ...
+def synthesize_many(
+    surface: Surface,
+    center_of_mass: tuple[float, float, float],
+    cone: _Cone,
+    fingers: int,
+    top: int,
+    square: _Floats,
+    allowed: NDArray[np.bool_] | None,
+    limits: _Limits,
+    polished: bool,
+    threads: int,
+) -> list[list[float]]: ...
 def synthesize(
     surface: Surface,
     center_of_mass: tuple[float, float, float],

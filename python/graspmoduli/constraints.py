@@ -13,7 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from ._arrays import Floats, a_callback, a_path, brief, floats, number, numbers, vectors
+from ._arrays import (
+    Floats,
+    NoGraspLeftError,
+    a_callback,
+    a_path,
+    brief,
+    floats,
+    number,
+    numbers,
+    vectors,
+)
 from ._core import GraspModuliError
 from ._files import read_toml
 from ._values import Value
@@ -23,6 +33,9 @@ from .tasks import gravity, task_quality
 SPARE = 1e-9
 #: A fingertip keeps clear of obstacles on the last part of its way, so many of its radii.
 WAY = 4.0
+
+#: Cells of a surface, over u and θ, of which regions are asked.
+GRID = (64, 128)
 
 Booleans = NDArray[np.bool_]
 #: A box or half-space as the kernels take it: is it a box, and its corners or point and normal.
@@ -167,6 +180,28 @@ class Constraints(Value):
             return True
         return self.force * task_quality(grasp, task=gravity(self.payload)) >= 1.0
 
+    def cells(
+        self,
+        surface: Any,
+        pose: Floats | None,
+        allowed: Booleans | None,
+        tip_radius: float = 0.0,
+    ) -> Booleans:
+        """Cells of a surface, over u and θ, in whose middles single fingers may press, those of
+        ``allowed`` or of a grid of :data:`GRID`."""
+        rows, columns = GRID if allowed is None else allowed.shape
+        u, theta = np.meshgrid(
+            (np.arange(rows) + 0.5) / rows,
+            (np.arange(columns) + 0.5) * (2.0 * np.pi / columns),
+            indexing="ij",
+        )
+        points = surface.points(u.ravel(), theta.ravel())
+        normals = surface.normals(u.ravel(), theta.ravel())
+        if pose is not None:
+            points, normals = points @ pose[:3, :3].T + pose[:3, 3], normals @ pose[:3, :3].T
+        own = self.places(points, normals, self.limits(tip_radius)).reshape(rows, columns)
+        return own if allowed is None else own & allowed
+
     @property
     def after_search(self) -> bool:
         """Is there a question that only Python answers?"""
@@ -195,6 +230,11 @@ class Constraints(Value):
         """This one alone."""
         others = (other for other in self.given if other != name)
         return functools.reduce(Constraints.without, others, self)
+
+    @property
+    def pairs_alone(self) -> Constraints:
+        """Those on pairs of fingers."""
+        return Constraints(opening=self.opening, gap=self.gap)
 
     def limits(
         self,
@@ -236,6 +276,28 @@ def a_constraint(name: str, value: Any) -> Constraints:
     if not isinstance(value, Constraints):
         raise GraspModuliError(f"{name} must be a gm.Constraints, got {brief(value)}")
     return value
+
+
+def raise_for_none(asked: Constraints, found: Callable[[Constraints], Sequence[Any]]) -> None:
+    """An error that names the constraint without which ``found`` finds grasps, if there is one."""
+
+    def is_found(own: Constraints) -> bool:
+        try:
+            return len(found(own)) > 0
+        except NoGraspLeftError:
+            return False
+
+    names = asked.given
+    for name in names:
+        if is_found(asked.without(name)):
+            raise NoGraspLeftError(
+                f"{name} must leave a grasp of the object, got none; without it there are some"
+            )
+    if len(names) > 1 and is_found(Constraints()):
+        raise NoGraspLeftError(
+            "constraints must leave a grasp of the object, got none, nor with any one of "
+            f"{', '.join(names)} left out; without all of them there are some"
+        )
 
 
 #: Values of two parts, and what tables of a TOML file call them.

@@ -6,6 +6,7 @@ the same name. ``from graspmoduli.quality import ...`` still reaches into the mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, overload
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, finite, floats, locked, number
+from ._arrays import Floats, coefficient, finite, floats, locked, number
 from ._batches import Batch, GraspLike, batch, check_gradient
 from ._core import GraspModuliError
 from ._values import Value
@@ -371,6 +372,32 @@ def circular_quality(
         if isinstance(bound, np.ndarray):
             locked(bound)
     return Bounds(lower, upper, wanted)
+
+
+def pad_torsion(radius: float, friction: float = 1.0) -> float:
+    """The torsional friction coefficient γ of a soft fingertip, a length.
+
+    A round contact of radius a that is pressed with f_n, its pressure that of Hertz, slips under a
+    torque about its normal of (3π/16) μ a f_n: K. L. Johnson, Contact Mechanics, 1985, Sec. 7.4;
+    R. D. Howe and M. R. Cutkosky, Practical force-motion models for sliding manipulation, Int. J.
+    Robotics Research 15(6), 1996. Of an even pressure it is 2/3 in the place of 3π/16.
+
+    Parameters
+    ----------
+    radius
+        Of the contact, in the unit of the object: of a flat pad its own, of a ball that of the
+        patch that is pressed flat.
+    friction
+        Coulomb friction coefficient μ.
+
+    Examples
+    --------
+    >>> import graspmoduli as gm
+    >>> round(gm.pad_torsion(0.01, friction=0.8), 6)
+    0.004712
+    """
+    a = number("radius", radius, positive=True)
+    return 3.0 * math.pi / 16.0 * coefficient("friction", friction) * a
 
 
 def quality_of_wrenches(wrenches: ArrayLike) -> Any:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 from ._arrays import Floats, a_callback, cells, coordinates, cores, count, floats
 from ._batches import Cone, evaluated_with, fingers, frictions_of
 from ._core import GraspModuliError
+from .constraints import Constraints, a_constraint, raise_for_none
 from .grasps import Grasp, RankedGrasp, a_surface, place
 from .quality import largest_quality, quality
 from .sampling import unit_square
@@ -18,6 +20,8 @@ from .surfaces import Surface
 
 #: Sampled contacts from which synthesis starts where deformation does not find enough grasps.
 EXTRA_SAMPLES = 40
+#: Contacts all over the surface among which other fingers are placed.
+SAMPLES = 1_000
 #: Most contacts of a grasp that is searched for, most grasps that are returned, most threads.
 MOST_CONTACTS, MOST_RANKED, MOST_THREADS = 100, 1_000_000, 1_024
 #: Most grasps that synthesis returns, or follows.
@@ -123,6 +127,9 @@ def best_grasps(
 def synthesize(
     surface: Surface,
     *,
+    contacts: int = 3,
+    torsion: float = 0.0,
+    norm: str = "sum",
     top: int = 5,
     friction: ArrayLike = 1.0,
     edges: int = 8,
@@ -130,38 +137,60 @@ def synthesize(
     center_of_mass: ArrayLike | None = None,
     allowed: ArrayLike | None = None,
     starts: int | None = None,
+    constraints: Constraints | None = None,
 ) -> list[RankedGrasp]:
-    """Several different three-finger grasps of high quality, from scratch (Sec. IV.E).
+    """Several different grasps of high quality, from scratch (Sec. IV.E).
 
-    On the surface of revolution π(S) the best triples (u₁, 0), (u₂, π), (u₃, π) are found; turned
-    to several angles, they climb in Q_l while π(S) deforms into S, and then to a local maximum on
-    S itself, by exact gradients of all facets of the wrench hull near the origin. If that finds
-    too few grasps, the ascent also starts from the best of 40 sampled contacts.
+    Of three hard fingers that may go anywhere: on the surface of revolution π(S) the best triples
+    (u₁, 0), (u₂, π), (u₃, π) are found; turned to several angles, they climb in Q_l while π(S)
+    deforms into S, and then to a local maximum on S itself, by exact gradients of all facets of the
+    wrench hull near the origin. If that finds too few grasps, the ascent also starts from the best
+    of 40 sampled contacts.
+
+    Of other fingers, or within constraints: of 1,000 contacts all over the surface, the best of all
+    subsets of those that are farthest from each other climb from contact to contact, and then on
+    the surface by exact gradients, one facet at a time.
 
     Parameters
     ----------
     surface
         The object.
+    contacts
+        Fingers of a grasp.
+    torsion, norm
+        As in :func:`graspmoduli.quality`. Two fingers hold as soft ones only:
+        :func:`graspmoduli.pad_torsion` tells what their pads have.
     top
         How many grasps are wanted. Fewer come back if fewer different ones are found.
     friction, edges
-        As in :func:`graspmoduli.quality`; friction positive, a number or one per finger, (3,).
+        As in :func:`graspmoduli.quality`; friction positive, a number or one per finger.
     seed
         Of the sampled contacts.
     center_of_mass
-        Shape (3,); the surface's own z_S if not given.
+        Shape (3,); that of the constraints, or the surface's own z_S, if not given.
     allowed
         Where contacts may lie: booleans over a grid of cells, rows along u and columns along θ.
         Everywhere if not given.
     starts
         How many grasps of the heuristic are followed: more find better ones, and take longer.
         ``top + 1`` if not given.
+    constraints
+        Where fingers may go and what they must hold, in the surface's coordinates. Fingertips are
+        points.
 
     Returns
     -------
     list of RankedGrasp
         Best first. Of any two grasps, in whatever order their contacts are compared, at least one
-        contact differs by 15 % of the object's radius.
+        contact differs by 15 % of the object's radius; on a surface of revolution turned copies of
+        a grasp come only where there are too few others.
+
+    Raises
+    ------
+    GraspModuliError
+        If an argument is wrong.
+    NoGraspLeftError
+        If the constraints leave no grasp.
 
     Examples
     --------
@@ -169,23 +198,87 @@ def synthesize(
     >>> best, *others = gm.synthesize(gm.shapes.model("pear"))
     >>> gm.quality(best) == best.quality >= others[0].quality
     True
+    >>> jaw = gm.Constraints(opening=(0.0, 0.8))
+    >>> gm.synthesize(gm.shapes.model("pear"), contacts=2, torsion=0.1, constraints=jaw, top=1)[
+    ...     0
+    ... ].quality > 0.05
+    True
     """
-    hand = fingers(friction, edges, 3)
-    center = center_of(a_surface("surface", surface), center_of_mass)
+    size = count("contacts", contacts, 1, MOST_CONTACTS)
+    hand = fingers(friction, edges, size, torsion, norm)
+    check_fingers(size, hand)
+    asked = a_constraint("constraints", constraints)
+    own = asked.center_of_mass if center_of_mass is None else center_of_mass
+    center = center_of(a_surface("surface", surface), own)
     top = count("top", top, 1, MOST_FOLLOWED)
     followed = top + 1 if starts is None else count("starts", starts, 1, MOST_FOLLOWED)
+    grid = cells(allowed)
+    if size != 3 or torsion > 0.0 or hand[3] or asked.given:
+        return _constrained(surface, center, hand, size, top, seed, grid, asked)
     square = unit_square(EXTRA_SAMPLES, seed)
-    rows = _core.synthesize(
-        surface._core,
-        center,
-        hand,
-        top,
-        followed,
-        square,
-        cells(allowed),
-    )
+    rows = _core.synthesize(surface._core, center, hand, top, followed, square, grid)
     grasps = [Grasp(row[0:6:2], row[1:6:2]) for row in rows]
     return [ranked_grasp(surface, grasp, center, hand) for grasp in grasps]
+
+
+def _constrained(
+    surface: Surface,
+    center: tuple[float, float, float],
+    hand: Cone,
+    size: int,
+    top: int,
+    seed: int,
+    grid: NDArray[np.bool_] | None,
+    asked: Constraints,
+) -> list[RankedGrasp]:
+    """Grasps that keep all constraints; an error that names the one that leaves none."""
+
+    def found(own: Constraints) -> list[RankedGrasp]:
+        here = own.limits(0.0)
+        where = grid if not own.after_search else own.cells(surface, None, grid)
+        kept: list[RankedGrasp] = []
+        for polished in (True, False) if own.after_search else (True,):
+            followed = min(4 * top, MOST_FOLLOWED) if own.after_search else top
+            grasps = many_grasps(surface, center, hand, size, followed, seed, where, here, polished)
+            kept += [
+                one for one in grasps if own.allow(one.contacts, one.normals) and own.hold(one)
+            ]
+            if len(kept) >= top:
+                break
+        return sorted(kept, key=lambda one: one.quality, reverse=True)[:top]
+
+    best = found(asked)
+    if not best and asked.given:
+        raise_for_none(asked, found)
+    return best
+
+
+def many_grasps(
+    surface: Surface,
+    center: tuple[float, float, float],
+    hand: Cone,
+    size: int,
+    top: int,
+    seed: int,
+    allowed: NDArray[np.bool_] | None,
+    limits: Any,
+    polished: bool = True,
+) -> list[RankedGrasp]:
+    """Grasps of any number of fingers within limits of the kernels."""
+    square = unit_square(SAMPLES, seed)
+    rows = _core.synthesize_many(
+        surface._core, center, hand, size, top, square, allowed, limits, polished, cores()
+    )
+    return [ranked_grasp(surface, Grasp(row[0:-1:2], row[1:-1:2]), center, hand) for row in rows]
+
+
+def check_fingers(size: int, hand: Cone) -> None:
+    """Two hard fingers hold nothing, wherever they are."""
+    if size == 2 and hand[2] == 0.0:
+        raise GraspModuliError(
+            "torsion must be positive for two contacts, got 0: hard fingers cannot resist a twist "
+            "about the line between them; gm.pad_torsion(radius) is that of a pad"
+        )
 
 
 def plane_grasp(

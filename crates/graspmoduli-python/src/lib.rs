@@ -94,7 +94,7 @@ mod _core {
         quality_at_least, quality_gradient, quality_of_one, quality_of_wrenches, tangents, weakest,
     };
     #[pymodule_export]
-    use super::search::{best_subsets, synthesize};
+    use super::search::{best_subsets, synthesize, synthesize_many};
     #[pymodule_export]
     use super::surfaces::{Surface, combine, sample_points};
     #[pymodule_export]

@@ -1,10 +1,12 @@
 //! Grasps that are looked for.
 
+use crate::limits::Limits;
 use crate::pool::interruptible;
 use crate::quality;
 use crate::surfaces::Surface;
 use crate::{Cone, raise, table, vectors};
 use graspmoduli::error::Error;
+use graspmoduli::many_fingers;
 use graspmoduli::region::{Anywhere, Cells, Region};
 use graspmoduli::search;
 use graspmoduli::synthesis;
@@ -112,4 +114,42 @@ pub fn cells<'a>(allowed: Option<&'a PyReadonlyArray2<'_, bool>>) -> PyResult<Op
 
 pub fn region<'a>(cells: Option<&'a Cells<'a>>) -> &'a dyn Region {
     cells.map_or(&Anywhere, |cells| cells)
+}
+
+/// Grasps of any number of fingers within limits, best first: per row u₁, θ₁, …, quality.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the kernel's arguments, flat")]
+pub fn synthesize_many<'py>(
+    py: Python<'py>,
+    surface: &Surface,
+    center_of_mass: [f64; 3],
+    cone: Cone,
+    fingers: usize,
+    top: usize,
+    square: PyReadonlyArray2<'py, f64>,
+    allowed: Option<PyReadonlyArray2<'py, bool>>,
+    limits: Limits,
+    polished: bool,
+    threads: usize,
+) -> PyResult<Vec<Vec<f64>>> {
+    let square: &[[f64; 2]] = square.as_slice()?.as_chunks().0;
+    let cells = cells(allowed.as_ref())?;
+    let request = many_fingers::Request {
+        cone: &cone.0,
+        fingers,
+        top,
+        region: region(cells.as_ref()),
+        limits: &limits.0,
+        polished,
+    };
+    let center = center_of_mass.into();
+    let found = interruptible(py, |stop| {
+        many_fingers::grasps(&surface.0, center, &request, square, threads, stop)
+    })?;
+    let row = |(at, quality): (Vec<[f64; 2]>, f64)| {
+        let mut row = at.into_flattened();
+        row.push(quality);
+        row
+    };
+    Ok(found.into_iter().map(row).collect())
 }

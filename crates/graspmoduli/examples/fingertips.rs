@@ -2,12 +2,12 @@
 
 use graspmoduli::glam::DVec3;
 use graspmoduli::limits::Limits;
+use graspmoduli::places::Wanted;
 use graspmoduli::touch::map::map;
 use graspmoduli::touch::mesh::Mesh;
 use graspmoduli::touch::polish::ROUNDS;
 use graspmoduli::touch::press::Tip;
 use graspmoduli::touch::search::grasps;
-use graspmoduli::touch::wanted::Wanted;
 use graspmoduli::{Error, FrictionCone};
 use std::sync::atomic::AtomicBool;
 

@@ -56,6 +56,7 @@
 #![allow(rustdoc::private_intra_doc_links)]
 
 pub mod ascent;
+mod bundle;
 pub mod contact;
 pub mod distance;
 #[cfg(feature = "rand")]
@@ -64,9 +65,11 @@ pub mod error;
 pub mod guarantees;
 pub mod interpolation;
 pub mod limits;
+pub mod many_fingers;
 pub mod math;
 mod nnls;
 mod parallel;
+pub mod places;
 pub mod quality;
 pub mod region;
 pub mod sampling;

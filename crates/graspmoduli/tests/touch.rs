@@ -4,12 +4,12 @@
 use glam::{DMat3, DVec3};
 use graspmoduli::contact::FrictionCone;
 use graspmoduli::limits::Limits;
-use graspmoduli::touch::map::{Place, map};
+use graspmoduli::places::{Place, Wanted};
+use graspmoduli::touch::map::map;
 use graspmoduli::touch::mesh::Mesh;
 use graspmoduli::touch::polish::ROUNDS;
 use graspmoduli::touch::press::Tip;
 use graspmoduli::touch::search::grasps;
-use graspmoduli::touch::wanted::Wanted;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use std::sync::atomic::AtomicBool;

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Floats, NoGraspLeftError, brief, count, finite, floats, locked, number
-from .._batches import NORMS, Cone, fingers
+from .._batches import Cone, fingers
 from .._core import GraspModuliError
-from ..constraints import Constraints, a_constraint
+from ..constraints import Constraints, a_constraint, raise_for_none
 from ..grasps import Grasp
-from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, synthesize
+from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, check_fingers, many_grasps, synthesize
 from ..transfers import transfer
 from .fitted import Fitted
 from .likeness import cells, ways
@@ -70,11 +70,12 @@ class Fit(Fitted):
         Parameters
         ----------
         contacts
-            Fingers of a grasp; of a cloud of points three.
+            Fingers of a grasp.
         torsion
-            Torsional friction coefficient of soft fingers, a length; of a cloud of points 0.
+            Torsional friction coefficient of soft fingers, a length: two hold as soft ones only,
+            with :func:`graspmoduli.pad_torsion` of their pads.
         norm
-            As in :func:`graspmoduli.quality`; of a cloud of points ``"sum"``.
+            As in :func:`graspmoduli.quality`.
         top
             How many grasps are wanted. Fewer come back if fewer are found, none if the object is
             too thin for these tips or too slippery: on a mesh, qualities below 0.001 do not count.
@@ -101,11 +102,19 @@ class Fit(Fitted):
         size = count("contacts", contacts, 1, MOST_CONTACTS)
         many = count("top", top, 1, MOST_FOLLOWED)
         hand = fingers(friction, edges, size, torsion, norm)
+        check_fingers(size, hand)
         start = count("seed", seed, 0)
         asked = a_constraint("constraints", constraints)
         center = self._center(asked.center_of_mass if center_of_mass is None else center_of_mass)
         if self.mesh is None:
-            return self._of_cloud(size, many, hand, start, center, tip_radius, errors, asked)
+
+            def of_cloud(own: Constraints) -> list[ObjectGrasp]:
+                return self._of_cloud(size, many, hand, start, center, tip_radius, errors, own)
+
+            held = of_cloud(asked)
+            if not held and asked.given:
+                raise_for_none(asked, of_cloud)
+            return held
         radius = tip(self.mesh, tip_radius)
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
         # Equal ones stay in the order of their Q_l.
@@ -113,7 +122,10 @@ class Fit(Fitted):
         wanted = Search(hand, center, self.length_scale, size, many, aim, asked)
         found = self._of_mesh(radius, start, wanted)
         if not found and asked.given:
-            self._check_constraints(radius, start, wanted)
+            raise_for_none(
+                asked,
+                lambda own: self._of_mesh(radius, start, wanted._replace(constraints=own, top=1)),
+            )
         return sorted(found, key=key, reverse=True)[:many]
 
     def _of_mesh(self, radius: float, seed: int, wanted: Search) -> list[ObjectGrasp]:
@@ -144,27 +156,6 @@ class Fit(Fitted):
         return not asked.given or (
             asked.allow(grasp.contacts, grasp.normals, tip_radius=tip_radius) and asked.hold(grasp)
         )
-
-    def _check_constraints(self, radius: float, seed: int, wanted: Search) -> None:
-        """An error that names the constraint without which there are grasps, if there is one."""
-        names = wanted.constraints.given
-        for name in names:
-            others = wanted._replace(constraints=wanted.constraints.without(name), top=1)
-            try:
-                found = self._of_mesh(radius, seed, others)
-            except NoGraspLeftError:
-                continue
-            if found:
-                raise NoGraspLeftError(
-                    f"{name} must leave a grasp of the object, got none; without it there are some"
-                )
-        if len(names) > 1 and self._of_mesh(
-            radius, seed, wanted._replace(constraints=Constraints(), top=1)
-        ):
-            raise NoGraspLeftError(
-                f"constraints must leave a grasp of the object, got none with any one of "
-                f"{', '.join(names)} left out; without all of them there are some"
-            )
 
     def _center(self, center_of_mass: ArrayLike | None) -> Floats:
         if center_of_mass is None:
@@ -197,11 +188,6 @@ class Fit(Fitted):
         asked: Constraints,
     ) -> list[ObjectGrasp]:
         mu, edges, torsion, each = hand
-        if size != 3 or torsion > 0.0 or each:
-            raise GraspModuliError(
-                'contacts must be 3, torsion 0 and norm "sum" for a cloud of points, '
-                f'got {size}, {torsion:g} and "{NORMS[each]}"; a mesh takes others'
-            )
         if errors is not None:
             raise GraspModuliError(
                 f"errors must be left out for a cloud of points, got {errors:g}: they are tried on "
@@ -212,28 +198,44 @@ class Fit(Fitted):
             radius = number("tip_radius", tip_radius, positive=True)
         scale = self._surface_radius
         sure = None if self.scanned is None else self.scanned.sure
+        middle = (center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale
         # A finger that must meet what was seen is not in thin air, wherever it meets it.
         for allowed in (self.allowed,) if sure is None else (self.allowed & sure, self.allowed):
+            if asked.given:
+                allowed = asked.cells(self.surface, self.pose, allowed, radius)
             if not allowed.any():
                 continue
-            # Where contacts are not allowed everywhere, more starts find better grasps.
-            found = synthesize(
-                self.unit_surface,
-                top=min(2 * top + 2, MOST_FOLLOWED),
-                starts=min(4 * top + 4, MOST_FOLLOWED),
-                friction=mu if len(mu) > 1 else mu[0],
-                edges=edges,
-                seed=seed,
-                allowed=allowed,
-                center_of_mass=(center - self.pose[:3, 3]) @ self.pose[:3, :3] / scale,
-            )
+            if size == 3 and torsion == 0.0 and not each and not asked.given:
+                # Where contacts are not allowed everywhere, more starts find better grasps.
+                found = synthesize(
+                    self.unit_surface,
+                    top=min(2 * top + 2, MOST_FOLLOWED),
+                    starts=min(4 * top + 4, MOST_FOLLOWED),
+                    friction=mu if len(mu) > 1 else mu[0],
+                    edges=edges,
+                    seed=seed,
+                    allowed=allowed,
+                    center_of_mass=middle,
+                )
+            else:
+                pairs = asked.pairs_alone.limits(radius, size=scale)
+                x, y, z = middle.tolist()
+                unit = (mu, edges, torsion / scale, each)
+                many = min(4 * top + 4, MOST_FOLLOWED)
+                found = many_grasps(
+                    self.unit_surface, (x, y, z), unit, size, many, seed, allowed, pairs
+                )
             # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in
             # those of the object differs slightly from the surface's own.
             ranked = []
             for one in found:
                 flat = self._placed(one.grasp, hand, center)
                 pressed = self._pressed_on_points(flat, hand, center, radius)
-                if pressed is not None and min(flat.quality, pressed.quality) > 0.0:
+                if (
+                    pressed is not None
+                    and min(flat.quality, pressed.quality) > 0.0
+                    and self._keeps(asked, pressed, radius)
+                ):
                     ranked.append((by_evidence(flat, pressed), pressed))
             if ranked:
                 first = max(ranked, key=lambda pair: pair[0])[1]

@@ -1,12 +1,11 @@
 //! What of a grasp is true: what rays, balls and badly aimed fingers find at its contacts.
 
 use super::OUTSIDE;
-use super::map::Place;
 use super::mesh::Mesh;
 use super::press::{ALIKE, Tip, land_along};
-use super::wanted::Wanted;
 use crate::contact::Frame;
 use crate::math;
+use crate::places::{Place, Wanted};
 use crate::quality::Evaluator;
 use glam::DVec3;
 use std::f64::consts::TAU;

@@ -3,6 +3,7 @@
 use super::mesh::Mesh;
 use super::press::{ALIKE, Pressed, Tip, land_along};
 use crate::parallel::*;
+use crate::places::Place;
 use glam::DVec3;
 
 /// A sample is seen from outside if the ray along its normal lands this close to it.
@@ -13,20 +14,6 @@ const BLOCKED: f64 = 0.35;
 const NEAR: f64 = 0.03;
 /// cos 20°: what a tip feels must be so close to how it comes.
 const STRAIGHT: f64 = 0.939_692_620_785_908_4;
-/// A place where a tip may press.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    /// Where the middle of the tip lands.
-    pub point: DVec3,
-    /// How the tip comes: a unit vector into the object, the normal that it feels there.
-    pub normal: DVec3,
-    /// As in [`Pressed`].
-    pub off: f64,
-    /// As in [`Pressed`].
-    pub bearing: f64,
-    /// Does the tip touch, and like here, if it aims half a radius beside?
-    pub steady: bool,
-}
 
 /// The places found from samples of the area, a row of three random numbers in [0, 1) for each; the
 /// same for any number of threads.

@@ -9,7 +9,7 @@
 //! | [`mesh`] | triangles in a tree: rays, sweeps of a ball, nearest points |
 //! | [`press`] | one tip at one place: the normal that it feels, is it blocked, how flat is it there |
 //! | [`map`] | many places all over the object |
-//! | [`search`] | the best grasps of a map, climbed on the map |
+//! | [`search`] | the best grasps of a map, by [`crate::places`], polished and true |
 //! | [`polish`] | ascent on the mesh itself, every step pressed anew |
 //! | [`gate`] | what of a grasp is true: exact normals, a ball, errors of aim |
 //!
@@ -21,7 +21,6 @@ pub mod mesh;
 pub mod polish;
 pub mod press;
 pub mod search;
-pub mod wanted;
 
 /// Farther than the mesh from the origin, whose size is 1: from there tips start.
 pub(crate) const OUTSIDE: f64 = 2.0;

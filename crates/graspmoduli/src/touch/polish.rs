@@ -1,11 +1,11 @@
 //! Ascent of a grasp's quality on the mesh itself: every step is a tip pressed anew.
 
-use super::map::{Place, place};
+use super::map::place;
 use super::mesh::Mesh;
 use super::press::Tip;
-use super::wanted::Wanted;
 use crate::contact::Frame;
 use crate::math;
+use crate::places::{Place, Wanted};
 use crate::quality::Evaluator;
 use std::f64::consts::TAU;
 

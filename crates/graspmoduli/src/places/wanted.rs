@@ -1,6 +1,6 @@
-//! What is looked for on a mesh, and when two grasps are different.
+//! What is looked for among places, and when two grasps are different.
 
-use super::map::Place;
+use super::Place;
 use crate::contact::{Contact, FrictionCone};
 use crate::limits::Limits;
 use crate::quality::Evaluator;
