@@ -9,8 +9,9 @@ use glam::DVec3;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// About so many subsets are searched.
+/// About so many subsets are searched, and of more than three fingers.
 const SUBSETS: u64 = 170_000;
+const SUBSETS_OF_MANY: u64 = 25_000;
 /// Of so many places at most; and where few pairs may be together.
 const PLACES: usize = 100;
 const MOST_PLACES: usize = 400;
@@ -114,13 +115,19 @@ fn different(
 /// and, if that matters, which of them fingers may press at together.
 fn farthest(map: &[Place], wanted: &Wanted<'_>) -> (Vec<usize>, Option<Together>) {
     let fingers = wanted.fingers;
+    // Of many fingers a grasp has more ways to climb, and takes longer to look at.
+    let budget = if fingers > 3 {
+        SUBSETS_OF_MANY
+    } else {
+        SUBSETS
+    };
     let most_of = |share: f64, limit: usize| {
         // Where few pairs may be together, so may few subsets, and more places can be searched. Of
         // a triple two pairs count: near places have the same neighbours.
         let pairs = fingers.saturating_sub(1) as i32;
         let allowed = |n: usize| subsets(n, fingers) as f64 * share.powi(pairs);
         let mut most = fingers;
-        while most < limit && allowed(most + 1) <= SUBSETS as f64 {
+        while most < limit && allowed(most + 1) <= budget as f64 {
             most += 1;
         }
         most
