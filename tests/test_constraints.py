@@ -69,9 +69,7 @@ def random_rules(random, fit):
     def boxes():
         many = random.integers(1, 3)
         middles, sides = random.uniform(low, high, (many, 3)), random.uniform(0.05, 0.5, (many, 3))
-        return [
-            (m - s * size / 2, m + s * size / 2) for m, s in zip(middles, sides, strict=True)
-        ]
+        return [(m - s * size / 2, m + s * size / 2) for m, s in zip(middles, sides, strict=True)]
 
     rules = {}
     if random.random() < 0.5:
@@ -105,10 +103,11 @@ def attack(fits, many, seed):
             found = fit.synthesize(
                 contacts=fingers, torsion=torsion, top=3, constraints=gm.Constraints(**rules)
             )
-        except gm.NoGraspLeftError as error:
+        except gm.NoGraspLeftError as none:
+            found, sentence = [], str(none)
+        if not found:
             refused += 1
-            assert any(name in str(error) for name in rules), error
-            continue
+            assert any(name in sentence for name in rules), sentence
         for grasp in found:
             assert not broken(rules, grasp, 0.05 * fit.mesh.size)
             assert grasp.quality > 0.0
@@ -246,7 +245,7 @@ def test_files_say_the_same_as_arguments(tmp_path):
     assert gm.Constraints.load(path) == here
     assert hash(gm.Constraints.load(path)) == hash(here)
     path.write_text("openning = [0, 1]")
-    with pytest.raises(gm.GraspModuliError, match="must be of opening, gap, .* got 'openning'"):
+    with pytest.raises(gm.GraspModuliError, match=r"must be of opening, gap, .* got 'openning'"):
         gm.Constraints.load(path)
 
 

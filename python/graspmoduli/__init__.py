@@ -17,7 +17,7 @@ guarantees             :func:`certified_radius`, :func:`certify_transfer`,
 finding grasps         :func:`sample_points`, :func:`best_grasps`, :func:`synthesize`,
                        :func:`plane_grasp`
 real objects           :func:`fit`, :func:`fit_parts`, :func:`contact_map`
-where fingers may go   :class:`Constraints`
+where fingers may go   :class:`Constraints`, :func:`contact_regions`
 errors                 :class:`GraspModuliError`, :class:`NoGraspLeftError`,
                        :class:`MissingExtraError`
 =====================  ======================================================================
@@ -37,6 +37,9 @@ from .configurations import Configurations as Configurations
 from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
 from .constraints import Constraints as Constraints
+from .contact_regions import ContactRegion as ContactRegion
+from .contact_regions import ContactRegions as ContactRegions
+from .contact_regions import contact_regions as contact_regions
 from .epsilon import Epsilon as Epsilon
 from .epsilon import epsilon as epsilon
 from .grasps import Grasp as Grasp

@@ -125,6 +125,13 @@ class TriangleMesh:
         return Shape(locked(self.back(center)), False)
 
     @cached_property
+    def area(self) -> float:
+        """Of all triangles, in the object's unit, squared."""
+        corners = self.local(self.vertices)[self.faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return float(0.5 * np.sqrt((across * across).sum(axis=1)).sum() * self.size**2)
+
+    @cached_property
     def radius(self) -> float:
         """The largest distance of a vertex from the centre of mass."""
         away = self.vertices - self.shape.center_of_mass
