@@ -237,6 +237,8 @@ class TestWrongTypes:
                                "center_of_mass": ORIGIN, "edges": 8}),
         (gm.quality_of_wrenches, {"wrenches": np.vstack([np.eye(3), -np.eye(3)])}),
         (gm.circular_quality, PLAIN | {"friction": 0.5, "tolerance": 0.1}),
+        (gm.measures, PLAIN | {"friction": 0.5, "edges": 8, "torsion": 0.1, "norm": "sum",
+                               "length_scale": 1.0}),
         (gm.WrenchSpace, PLAIN | {"friction": 0.5, "edges": 8, "torsion": 0.1}),
         (gm.WrenchSpace(CIRCLE, -CIRCLE, ORIGIN).resist, {"wrench": [0, 0, 1, 0, 0, 0]}),
         (gm.contact_frames, {"contacts": CIRCLE, "normals": -CIRCLE}),

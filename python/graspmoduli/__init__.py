@@ -4,6 +4,8 @@
 grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
 given wrenches         :func:`quality_of_wrenches`; soft fingers: :func:`pad_torsion`
+given wrenches         :func:`quality_of_wrenches`
+other measures         :func:`measures`: largest force and torque, singular values, min-weight
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench;
                        :func:`contact_frames`
 surfaces               :class:`Surface`, :func:`combine`, :func:`project`, :mod:`shapes`
@@ -52,6 +54,8 @@ from .guarantees import Certificate as Certificate
 from .guarantees import certified_radius as certified_radius
 from .guarantees import certify_transfer as certify_transfer
 from .guarantees import transfer_bound as transfer_bound
+from .measures import Measures as Measures
+from .measures import measures as measures
 from .moduli import SurfaceDistance as SurfaceDistance
 from .moduli import distance as distance
 from .moduli import interpolate as interpolate

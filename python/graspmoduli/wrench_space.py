@@ -15,6 +15,7 @@ from ._batches import Batch, GraspLike, batch, is_each
 from ._core import GraspModuliError
 from ._values import Value, hashable, same
 from .equilibrium import BALANCED, least_sum
+from .grasp_matrix import singular_values
 from .halfspaces import FLAT, facet_normals, hull_volume
 
 #: Equilibria within this of the origin, in units of forces and of torques over the longest lever
@@ -333,19 +334,13 @@ class WrenchSpace:
 
     @cached_property
     def smallest_singular_value(self) -> float:
-        """Of the grasp map from the contact forces to their wrench, a 6 × 3m matrix.
+        """Of the grasp matrix; all six are in :func:`graspmoduli.measures`.
 
-        Torques over the length scale. Exactly 0 if the map has no full rank, to 1e-12.
+        Torques over the length scale. Exactly 0 if the matrix has no full rank, to 1e-12.
         """
-        reach = float(self._reach[3])
-        levers = (self.contacts - self.center_of_mass) / reach
-        balanced = np.hstack([np.vstack([np.eye(3), _cross(r)]) for r in levers])
-        extents = np.linalg.svd(balanced, compute_uv=False)
-        if len(extents) < 6 or extents[-1] <= FLAT * extents[0]:
-            return 0.0
-        # Through the inverse, whose largest singular value is accurate whatever the lever arms.
-        inverse = np.linalg.pinv(balanced, rcond=FLAT) * (self._units / self._reach)
-        return 1.0 / float(np.linalg.norm(inverse, 2))
+        levers = (self.contacts - self.center_of_mass)[None]
+        normals = self.normals[None]
+        return float(singular_values(levers, normals, self.torsion, self.length_scale)[0, 5])
 
     def __repr__(self) -> str:
         return f"WrenchSpace({len(self.contacts)} contacts, Q_{self.edges} = {self.quality:.6g})"
@@ -363,9 +358,3 @@ def _space(*key: Any) -> WrenchSpace:
         torsion=torsion,
         length_scale=length_scale,
     )
-
-
-def _cross(r: Floats) -> Floats:
-    """The matrix of r × ·."""
-    x, y, z = r
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
