@@ -341,6 +341,23 @@ class TestDegenerate:
         assert np.isfinite(numbers).all()
         assert min(numbers) >= 0.0
 
+    @pytest.mark.parametrize("norm", ["sum", "each"])
+    @pytest.mark.parametrize("away", [0.0, 1e3, 1e6])
+    def test_nearly_flat_ones_far_away_are_what_the_kernel_says(self, away, norm):
+        rng = np.random.default_rng(9)
+        contacts, normals, centers = uniform_grasps(600, rng, 5)
+        flat = 10.0 ** rng.uniform(-7, 0, (600, 1, 2))
+        contacts[..., 1:] *= flat
+        contacts += away * rng.normal(size=3)
+        found = gm.measures(contacts, normals, centers, norm=norm)
+        q = gm.quality(contacts, normals, centers, norm=norm)
+        assert (q > 0.0).sum() > 100
+        for value in (found.force, found.torque):
+            assert (value >= q * (1 - 1e-9)).all()
+            np.testing.assert_array_equal(value > 0.0, q > 0.0)
+        np.testing.assert_array_equal(found.min_weight > 0.0, q > 0.0)
+        assert (found.singular_values[q > 0.0] > 0.0).all()
+
     def test_two_hard_fingers_hold_forces_only_on_a_knifes_edge(self):
         found = gm.measures(SQUEEZE, SQUEEZE_NORMALS, ORIGIN)
         assert found.force == found.torque == found.min_weight == 0.0

@@ -20,8 +20,8 @@ from .grasp_matrix import singular_values
 from .tasks import task_quality
 
 #: Where the length scale is this many times shorter (longer) than the longest lever arm, torques
-#: (forces) weigh nothing: their squares are far below rounding.
-FAR = 1e25
+#: (forces) weigh nothing: their squares are far below rounding. A power of two rounds nothing.
+FAR = 2.0**80
 #: Sums of normals and of their torques below this, relative to the longest lever arm, are 0.
 BALANCED = 1e-14
 
@@ -124,17 +124,16 @@ def measures(
     ([1.732051, 1.732051, 1.732051, 1.732051, 1.224745, 1.224745], 0.707107)
     """
     grasps = batch(contacts, normals, center_of_mass, friction, edges, torsion, length_scale, norm)
-    points, directions, centers, frictions = grasps.arrays
-    levers = points - centers[:, None]
-    spin = grasps.cone[2]
-    scale = np.broadcast_to(grasps.scale, (len(points),))
-    values = singular_values(levers, directions, spin, 1.0)
+    points, directions, centers, _ = grasps.arrays
+    distances = np.linalg.norm(points.mean(axis=1) - centers, axis=1)
+    scale = np.broadcast_to(grasps.scale, distances.shape)
+    values = singular_values(points, directions, centers, grasps.cone[2], 1.0)
     return Measures(
-        force=_shaped(grasps, _limit(grasps, levers, 1.0 / FAR)[0]),
-        torque=_shaped(grasps, np.multiply(*_limit(grasps, levers, FAR)) * scale),
+        force=_shaped(grasps, _limit(grasps, 1.0 / FAR)[0]),
+        torque=_shaped(grasps, np.multiply(*_limit(grasps, FAR)) * scale),
         singular_values=locked(values.reshape((*grasps.shape, 6))),
-        centroid_distance=_shaped(grasps, np.linalg.norm(levers.mean(axis=1), axis=1) * scale),
-        min_weight=_shaped(grasps, _min_weight(grasps, levers, directions, frictions)),
+        centroid_distance=_shaped(grasps, distances * scale),
+        min_weight=_shaped(grasps, _min_weight(grasps)),
     )
 
 
@@ -142,45 +141,49 @@ def _shaped(grasps: Batch, values: Floats) -> Any:
     return locked(values.reshape(grasps.shape)) if grasps.shape else float(values[0])
 
 
-def _limit(grasps: Batch, levers: Floats, far: float) -> tuple[Floats, Floats]:
+def _limit(grasps: Batch, far: float) -> tuple[Floats, Floats]:
     """Q where the length scale is ``far`` times the longest lever arm, and that length. (n,)"""
-    _, directions, _, frictions = grasps.arrays
+    points, directions, centers, frictions = grasps.arrays
     mu, edges, spin, each = grasps.cone
-    reach = np.maximum(np.linalg.norm(levers, axis=-1).max(axis=1), spin)
-    scale = far * np.where(reach > 0.0, reach, 1.0)
-    arms, still = levers / scale[:, None, None], np.zeros((len(levers), 3))
+    reach = np.maximum(_reach(points, centers), spin)
+    scale = far * np.exp2(np.floor(np.log2(np.where(reach > 0.0, reach, 1.0 / far))))
+    points, centers = points / scale[:, None, None], centers / scale[:, None]
 
     def quality(rows: slice, torsion: float) -> Floats:
         own = None if frictions is None else frictions[rows]
         return _core.quality(
-            (arms[rows], directions[rows], still[rows], own), (mu, edges, torsion, each)
+            (points[rows], directions[rows], centers[rows], own), (mu, edges, torsion, each)
         )
 
     if spin == 0.0:
         return quality(slice(None), 0.0), scale
     # The kernel takes one torsion for all.
-    each_alone = [quality(slice(k, k + 1), spin / scale[k])[0] for k in range(len(levers))]
-    return np.array(each_alone), scale
+    alone = [quality(slice(k, k + 1), spin / scale[k])[0] for k in range(len(points))]
+    return np.array(alone), scale
 
 
-def _min_weight(
-    grasps: Batch, levers: Floats, directions: Floats, frictions: Floats | None
-) -> Floats:
+def _min_weight(grasps: Batch) -> Floats:
+    points, directions, centers, frictions = grasps.arrays
     (mu,), edges, spin, _ = grasps.cone
     closed = _core.quality(grasps.arrays, grasps.cone) > 0.0
     # A cone's edges, with a soft finger's two torques or without, are its normal on average.
-    torques = np.cross(levers, directions).mean(axis=1)
+    torques = np.cross(points - centers[:, None], directions).mean(axis=1)
     means = np.concatenate([directions.mean(axis=1), torques], axis=1)
     # Not force closure where all lever arms are 0.
-    reach = np.where(closed, np.linalg.norm(levers, axis=-1).max(axis=1), 1.0)
+    reach = np.where(closed, _reach(points, centers), 1.0)
     sizes = np.maximum(np.abs(means[:, :3]).max(axis=1), np.abs(torques).max(axis=1) / reach)
     values = np.where(closed, 1.0, 0.0)
     rows = np.flatnonzero(closed & (sizes > BALANCED))
     if rows.size:
         own = mu if frictions is None else frictions[rows]
         resisted = task_quality(
-            levers[rows], directions[rows], np.zeros(3), means[rows, None],
+            points[rows], directions[rows], centers[rows], means[rows, None],
             friction=own, edges=edges, torsion=spin,
         )  # fmt: skip
         values[rows] = resisted / (1.0 + resisted)
     return values
+
+
+def _reach(points: Floats, centers: Floats) -> Floats:
+    """Longest lever arms. Shape (n,)."""
+    return np.linalg.norm(points - centers[:, None], axis=-1).max(axis=1)

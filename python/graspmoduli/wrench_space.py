@@ -338,9 +338,8 @@ class WrenchSpace:
 
         Torques over the length scale. Exactly 0 if the matrix has no full rank, to 1e-12.
         """
-        levers = (self.contacts - self.center_of_mass)[None]
-        normals = self.normals[None]
-        return float(singular_values(levers, normals, self.torsion, self.length_scale)[0, 5])
+        one = (self.contacts[None], self.normals[None], self.center_of_mass[None])
+        return float(singular_values(*one, self.torsion, self.length_scale)[0, 5])
 
     def __repr__(self) -> str:
         return f"WrenchSpace({len(self.contacts)} contacts, Q_{self.edges} = {self.quality:.6g})"
