@@ -4,7 +4,6 @@
 grasp quality          :func:`quality`, :func:`quality_gradient`, :func:`circular_quality`
 many grasps            :func:`quality_at_least`, :func:`largest_quality`, :func:`smallest_quality`
 given wrenches         :func:`quality_of_wrenches`; soft fingers: :func:`pad_torsion`
-given wrenches         :func:`quality_of_wrenches`
 other measures         :func:`measures`: largest force and torque, singular values, min-weight
 one grasp              :class:`WrenchSpace`: status, weakest direction, forces against a wrench;
                        :func:`contact_frames`

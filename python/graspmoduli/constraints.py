@@ -27,7 +27,8 @@ from ._arrays import (
 from ._core import GraspModuliError
 from ._files import read_toml
 from ._values import Value
-from .tasks import gravity, task_quality
+from .measures import measures
+from .tasks import gravity
 
 #: Constraints are met with this to spare, over the object's size: rounding breaks none.
 SPARE = 1e-9
@@ -178,7 +179,8 @@ class Constraints(Value):
         """Does a grasp hold the payload, whatever the direction of gravity, with the force?"""
         if self.payload is None or self.force is None:
             return True
-        return self.force * task_quality(grasp, task=gravity(self.payload)) >= 1.0
+        weight = float(-gravity(self.payload, (0.0, 0.0, -1.0))[0, 2])
+        return bool(self.force * measures(grasp).force >= weight)
 
     def cells(
         self,
