@@ -91,6 +91,7 @@ from .synthesis import best_grasps as best_grasps
 from .synthesis import plane_grasp as plane_grasp
 from .synthesis import synthesize as synthesize
 from .tasks import gravity as gravity
+from .tasks import task_gradient as task_gradient
 from .tasks import task_quality as task_quality
 from .transfers import QualityAlong as QualityAlong
 from .transfers import Transfer as Transfer

@@ -91,7 +91,8 @@ mod _core {
     #[pymodule_export]
     use super::quality::{
         certified_radius, circular_quality, contact_forces, extreme_quality, is_clean, quality,
-        quality_at_least, quality_gradient, quality_of_one, quality_of_wrenches, tangents, weakest,
+        quality_at_least, quality_gradient, quality_of_one, quality_of_wrenches, tangents,
+        task_gradient, task_quality, weakest,
     };
     #[pymodule_export]
     use super::search::{best_subsets, synthesize, synthesize_many};

@@ -348,6 +348,41 @@ pub fn contacts(points: &[[f64; 3]], normals: &[[f64; 3]]) -> Vec<Contact> {
         .collect()
 }
 
+/// The largest multiple of each grasp's own k loads that it resists: n grasps, loads (n, k, 6).
+#[pyfunction]
+pub fn task_quality<'py>(
+    py: Python<'py>,
+    grasps: Grasps<'py>,
+    cone: Cone,
+    loads: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (cone, batch) = (cone.0, grasps.batch()?);
+    let each = loads.as_array().shape()[1];
+    let loads: &[[f64; 6]] = loads.as_slice()?.as_chunks().0;
+    let mut out = vec![0.0; batch.centers.len()];
+    computed(py, batch, |batch| batch.task(&cone, loads, each, &mut out))?;
+    Ok(PyArray1::from_vec(py, out))
+}
+
+/// The same with its gradient: rows as those of [`quality_gradient`].
+#[pyfunction]
+pub fn task_gradient<'py>(
+    py: Python<'py>,
+    grasps: Grasps<'py>,
+    cone: Cone,
+    loads: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (cone, batch) = (cone.0, grasps.batch()?);
+    let each = loads.as_array().shape()[1];
+    let loads: &[[f64; 6]] = loads.as_slice()?.as_chunks().0;
+    let width = Gradient::width(grasps.0.as_array().shape()[1]);
+    let mut out = vec![0.0; batch.centers.len() * width];
+    computed(py, batch, |batch| {
+        batch.task_gradient(&cone, loads, each, &mut out)
+    })?;
+    PyArray1::from_vec(py, out).reshape([batch.centers.len(), width])
+}
+
 /// R(n) e₁ and R(n) e₂ of n unit normals. Shape (n, 2, 3).
 #[pyfunction]
 pub fn tangents<'py>(

@@ -129,7 +129,7 @@ impl Batch<'_> {
     }
 
     /// m, if the parts of the batch fit each other.
-    fn contacts_per_grasp(&self) -> Result<usize, Error> {
+    pub(super) fn contacts_per_grasp(&self) -> Result<usize, Error> {
         let (points, grasps) = (self.points.len(), self.centers.len());
         let m = points / grasps.max(1);
         let fits = |length: usize| length == m * grasps;
