@@ -235,6 +235,7 @@ class TestWrongTypes:
                               "center_of_mass": ORIGIN, "edges": 8}),
         (gm.smallest_quality, {"contacts": [CIRCLE], "normals": [-CIRCLE],
                                "center_of_mass": ORIGIN, "edges": 8}),
+        (gm.pad_torsion, {"radius": 0.01, "friction": 0.5}),
         (gm.quality_of_wrenches, {"wrenches": np.vstack([np.eye(3), -np.eye(3)])}),
         (gm.circular_quality, PLAIN | {"friction": 0.5, "tolerance": 0.1}),
         (gm.measures, PLAIN | {"friction": 0.5, "edges": 8, "torsion": 0.1, "norm": "sum",
@@ -256,6 +257,10 @@ class TestWrongTypes:
                           "contacts": 3, "top": 1, "friction": 0.5, "edges": 4, "threads": 1}),
         (gm.synthesize, {"surface": BOTTLE, "top": 1, "friction": 0.5, "edges": 4, "seed": 0,
                          "starts": 1, "allowed": np.zeros((3, 3), bool)}),
+        (gm.synthesize, {"surface": BOTTLE, "top": 1, "contacts": 4, "torsion": 0.1,
+                         "norm": "sum", "task": np.eye(6), "constraints": gm.Constraints()}),
+        (gm.task_quality, PLAIN | {"task": np.eye(6), "friction": 0.5, "edges": 8}),
+        (gm.task_gradient, PLAIN | {"task": np.eye(6), "friction": 0.5, "edges": 8}),
         (gm.plane_grasp, {"surface": BOTTLE, "heights": 3, "friction": 0.5, "edges": 4}),
     )  # fmt: skip
 

@@ -7,8 +7,10 @@ import pytest
 from scipy.optimize import linprog
 
 import graspmoduli as gm
+import objects_made
 from conftest import uniform_grasps
 from degenerate import CIRCLE
+from graspmoduli import tasks
 
 ORIGIN = np.zeros(3)
 
@@ -166,3 +168,111 @@ def test_weight_comes_from_everywhere():
     np.testing.assert_allclose(np.linalg.norm(task[:, :3], axis=1), 19.6133)
     assert np.abs(task[:, :3].mean(0)).max() < 0.01 * 19.6
     assert not task[:, 3:].any()
+
+
+@pytest.mark.parametrize("norm", ["sum", "each"])
+@pytest.mark.parametrize(("m", "torsion"), [(2, 0.3), (3, 0.0), (4, 0.1), (6, 0.0)])
+def test_the_gradient_agrees_with_differences(m, torsion, norm):
+    rng = np.random.default_rng(m)
+    hand: Any = {"friction": 0.7, "edges": 6, "torsion": torsion, "norm": norm}
+    some = uniform_grasps(4000, rng, m)
+    held = np.flatnonzero(gm.quality(*some, **hand) > 0.01)[:12]
+    task = rng.normal(size=(2, 6))
+    checked = 0
+    for k in held:
+        contacts, normals, center = (array[k] for array in some)
+        slope = gm.task_gradient(contacts, normals, center, task, **hand)
+        assert slope.value == gm.task_quality(contacts, normals, center, task, **hand)
+        for _ in range(4):
+            move, turn, shift = rng.normal(size=(m, 3)), rng.normal(size=(m, 3)), rng.normal(size=3)
+            turn -= (turn * normals).sum(axis=1, keepdims=True) * normals
+
+            def at(h, move=move, turn=turn, shift=shift, k=k):
+                ways = some[1][k] + h * turn
+                ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+                return gm.task_quality(
+                    some[0][k] + h * move, ways, some[2][k] + h * shift, task, **hand
+                )
+
+            step = 1e-6
+            ahead, behind = (at(step) - at(0)) / step, (at(0) - at(-step)) / step
+            if abs(ahead - behind) > 1e-4 * (1 + abs(ahead)):
+                continue  # A kink: another basis is best on either side.
+            exact = (
+                (slope.contacts * move).sum()
+                + (slope.normals * turn).sum()
+                + (slope.center_of_mass * shift).sum()
+            )
+            assert exact == pytest.approx((ahead + behind) / 2, rel=1e-4, abs=1e-5)
+            checked += 1
+    assert checked > 20
+
+
+def test_a_load_that_nothing_resists_has_no_slope():
+    slope = gm.task_gradient(CIRCLE[:2], -CIRCLE[:2], ORIGIN, [[0, 0, 1.0, 0, 0, 0], [1e9] * 6])
+    assert slope.value == 0.0
+    assert not slope.contacts.any()
+
+
+@pytest.mark.parametrize("norm", ["sum", "each"])
+def test_the_core_agrees_with_the_forces_of_a_wrench_space(norm):
+    """The slow twin, on uniform, flat and lattice grasps."""
+    rng = np.random.default_rng(8)
+    for m in (3, 4):
+        contacts, normals, centers = uniform_grasps(200, rng, m)
+        contacts[50:100, :, 2] *= 1e-5
+        contacts[100:150] = np.round(2 * contacts[100:150])
+        axes = np.concatenate([np.eye(3), -np.eye(3)])
+        normals[100:150] = axes[rng.integers(0, 6, (50, m))]
+        tasks = rng.normal(size=(200, 2, 6))
+        found = gm.task_quality(contacts, normals, centers, tasks, friction=0.8, norm=norm)
+        for k in range(200):
+            space = gm.WrenchSpace(contacts[k], normals[k], centers[k], friction=0.8)
+            slow = min(1.0 / space.resist(load, norm=norm).normal_force for load in tasks[k])
+            assert found[k] == pytest.approx(slow, rel=1e-8, abs=1e-12)
+
+
+class TestGraspsForATask:
+    LIFT, LID = gm.gravity(1.0, directions=16), np.eye(6)[[5, 5]] * [[1.0], [-1.0]]
+
+    def test_each_task_has_its_own_best_grasp(self):
+        jar = gm.shapes.MODELS["j"]
+        lifting = gm.synthesize(jar, task=self.LIFT, top=3)
+        turning = gm.synthesize(jar, task=self.LID, top=3)
+        for grasps, own, other in ((lifting, self.LIFT, turning), (turning, self.LID, lifting)):
+            values = [gm.task_quality(grasp, task=own) for grasp in grasps]
+            assert values == sorted(values, reverse=True)
+            assert values[0] > 1.05 * max(gm.task_quality(g, task=own) for g in other)
+            free = gm.synthesize(jar, top=5)
+            assert values[0] >= max(gm.task_quality(g, task=own) for g in free)
+
+    @pytest.mark.parametrize("options", [{"contacts": 4}, {"contacts": 2, "torsion": 0.1}])
+    def test_other_fingers_climb_in_their_task(self, options):
+        pot = gm.shapes.MODELS["c"]
+        best = gm.synthesize(pot, task=self.LID, top=1, **options)[0]
+        free = gm.synthesize(pot, top=5, **options)
+        assert gm.task_quality(best, task=self.LID) > max(
+            gm.task_quality(grasp, task=self.LID) for grasp in free
+        )
+
+    def test_on_a_mesh(self):
+        fit = gm.fit(objects_made.OBJECTS["bottle"]())
+        axis = fit.pose[:3, 2]
+        lid = np.concatenate([np.zeros((2, 3)), [axis, -axis]], axis=1)
+        found = fit.synthesize(task=lid)
+        values = [grasp.task_quality for grasp in found]
+        assert values == sorted(values, reverse=True)
+        assert found[0].task_quality == gm.task_quality(found[0], task=lid)
+        assert values[0] > 1.02 * max(gm.task_quality(g, task=lid) for g in fit.synthesize())
+
+    def test_files(self, tmp_path):
+        rows = tmp_path / "lid.txt"
+        rows.write_text("0 0 0 0 0 1  # open\n0, 0, 0, 0, 0, -1\n")
+        np.save(tmp_path / "lid.npy", self.LID)
+        (tmp_path / "lid.toml").write_text("wrenches = [[0, 0, 0, 0, 0, 1], [0, 0, 0, 0, 0, -1]]")
+        for name in ("lid.txt", "lid.npy", "lid.toml"):
+            np.testing.assert_array_equal(tasks.read_task(tmp_path / name), self.LID)
+        rows.write_text("0 0 0\n")
+        for name, words in (("lid.txt", "task must have shape"), ("none", "task must be gravity")):
+            with pytest.raises(gm.GraspModuliError, match=words):
+                tasks.read_task(tmp_path / name)

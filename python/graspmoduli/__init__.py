@@ -38,9 +38,6 @@ from .configurations import Configurations as Configurations
 from .configurations import sample_configurations as sample_configurations
 from .configurations import sample_nearby as sample_nearby
 from .constraints import Constraints as Constraints
-from .contact_regions import ContactRegion as ContactRegion
-from .contact_regions import ContactRegions as ContactRegions
-from .contact_regions import contact_regions as contact_regions
 from .epsilon import Epsilon as Epsilon
 from .epsilon import epsilon as epsilon
 from .grasps import Grasp as Grasp
@@ -62,6 +59,9 @@ from .moduli import placed_distance as placed_distance
 from .moduli import sample_combinations as sample_combinations
 from .moduli import sample_weights as sample_weights
 from .moduli import surface_distance as surface_distance
+from .objects.contact_regions import ContactRegion as ContactRegion
+from .objects.contact_regions import ContactRegions as ContactRegions
+from .objects.contact_regions import contact_regions as contact_regions
 from .objects.fitting import Fit as Fit
 from .objects.fitting import ObjectGrasp as ObjectGrasp
 from .objects.fitting import Residual as Residual

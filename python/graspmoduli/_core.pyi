@@ -115,6 +115,7 @@ def synthesize_many(
     square: _Floats,
     allowed: NDArray[np.bool_] | None,
     limits: _Limits,
+    task: list[list[float]],
     polished: bool,
     threads: int,
 ) -> list[list[float]]: ...

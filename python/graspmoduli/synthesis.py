@@ -17,6 +17,7 @@ from .grasps import Grasp, RankedGrasp, a_surface, place
 from .quality import largest_quality, quality
 from .sampling import unit_square
 from .surfaces import Surface
+from .tasks import one_task, scaled_task, task_quality
 
 #: Sampled contacts from which synthesis starts where deformation does not find enough grasps.
 EXTRA_SAMPLES = 40
@@ -138,6 +139,7 @@ def synthesize(
     allowed: ArrayLike | None = None,
     starts: int | None = None,
     constraints: Constraints | None = None,
+    task: ArrayLike | None = None,
 ) -> list[RankedGrasp]:
     """Several different grasps of high quality, from scratch (Sec. IV.E).
 
@@ -177,6 +179,9 @@ def synthesize(
     constraints
         Where fingers may go and what they must hold, in the surface's coordinates. Fingertips are
         points.
+    task
+        Loads that grasps are for, as for :func:`graspmoduli.task_quality`; shape (k, 6). Then they
+        climb in task quality and are ranked by it.
 
     Returns
     -------
@@ -213,8 +218,9 @@ def synthesize(
     top = count("top", top, 1, MOST_FOLLOWED)
     followed = top + 1 if starts is None else count("starts", starts, 1, MOST_FOLLOWED)
     grid = cells(allowed)
-    if size != 3 or torsion > 0.0 or hand[3] or asked.given:
-        return _constrained(surface, center, hand, size, top, seed, grid, asked)
+    loads = one_task(task)
+    if size != 3 or torsion > 0.0 or hand[3] or asked.given or loads is not None:
+        return _constrained(surface, center, hand, size, top, seed, grid, asked, loads)
     square = unit_square(EXTRA_SAMPLES, seed)
     rows = _core.synthesize(surface._core, center, hand, top, followed, square, grid)
     grasps = [Grasp(row[0:6:2], row[1:6:2]) for row in rows]
@@ -230,8 +236,14 @@ def _constrained(
     seed: int,
     grid: NDArray[np.bool_] | None,
     asked: Constraints,
+    task: Floats | None,
 ) -> list[RankedGrasp]:
     """Grasps that keep all constraints; an error that names the one that leaves none."""
+
+    loads = scaled_task(task, 1.0)
+
+    def value(one: RankedGrasp) -> float:
+        return one.quality if task is None else task_quality(one, task=task)
 
     def found(own: Constraints) -> list[RankedGrasp]:
         here = own.limits(0.0)
@@ -239,13 +251,26 @@ def _constrained(
         kept: list[RankedGrasp] = []
         for polished in (True, False) if own.after_search else (True,):
             followed = min(4 * top, MOST_FOLLOWED) if own.after_search else top
-            grasps = many_grasps(surface, center, hand, size, followed, seed, where, here, polished)
+            grasps = many_grasps(
+                surface,
+                center,
+                hand,
+                size,
+                followed,
+                seed,
+                where,
+                here,
+                loads,
+                polished,
+            )
             kept += [
-                one for one in grasps if own.allow(one.contacts, one.normals) and own.hold(one)
+                one
+                for one in grasps
+                if one.quality > 0.0 and own.allow(one.contacts, one.normals) and own.hold(one)
             ]
             if len(kept) >= top:
                 break
-        return sorted(kept, key=lambda one: one.quality, reverse=True)[:top]
+        return sorted(kept, key=value, reverse=True)[:top]
 
     best = found(asked)
     if not best and asked.given:
@@ -262,12 +287,13 @@ def many_grasps(
     seed: int,
     allowed: NDArray[np.bool_] | None,
     limits: Any,
+    task: list[list[float]],
     polished: bool = True,
 ) -> list[RankedGrasp]:
-    """Grasps of any number of fingers within limits of the kernels."""
+    """Grasps of any number of fingers within limits of the kernels, for a task if there is one."""
     square = unit_square(SAMPLES, seed)
     rows = _core.synthesize_many(
-        surface._core, center, hand, size, top, square, allowed, limits, polished, cores()
+        surface._core, center, hand, size, top, square, allowed, limits, task, polished, cores()
     )
     return [ranked_grasp(surface, Grasp(row[0:-1:2], row[1:-1:2]), center, hand) for row in rows]
 

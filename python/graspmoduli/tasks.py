@@ -8,15 +8,17 @@ by their hull, the largest multiple that fits is what :func:`task_quality` compu
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _core
-from ._arrays import Floats, count, finite, floats, locked, number
+from ._arrays import Floats, a_path, brief, count, finite, floats, locked, number
 from ._batches import Batch, batch
 from ._core import GraspModuliError
+from ._files import read_toml
 from .quality import QualityGradient
 
 
@@ -131,6 +133,48 @@ def a_task(value: Any) -> Floats:
     if not loads.any(axis=-1).all():
         raise GraspModuliError("task must hold no wrench that is 0, got one")
     return loads
+
+
+def read_task(path: str | os.PathLike[str]) -> Floats:
+    """The wrenches of a task from a file: rows of six numbers as text or NPY, or ``wrenches`` in a
+    TOML file. Shape (k, 6)."""
+    file = a_path(path)
+    if not file.is_file():
+        raise GraspModuliError(f"task must be gravity or a file of wrenches, got {file}")
+    if file.suffix.lower() == ".toml":
+        data = read_toml("task", file)
+        if set(data) != {"wrenches"}:
+            raise GraspModuliError(f"task must have wrenches and no more, got {brief(list(data))}")
+        return a_task(data["wrenches"])
+    try:
+        if file.suffix.lower() == ".npy":
+            rows = np.load(file)
+        else:
+            text = file.read_text().replace(",", " ").splitlines()
+            rows = np.loadtxt(text, ndmin=2)
+    # NumPy raises what it likes on files of other kinds.
+    except Exception as error:
+        raise GraspModuliError(
+            f"task must be rows of six numbers, got {file} ({' '.join(str(error).split())[:100]})"
+        ) from None
+    return a_task(rows)
+
+
+def one_task(value: Any) -> Floats | None:
+    """Wrenches of one task, (k, 6), if there is one."""
+    if value is None:
+        return None
+    loads = a_task(value)
+    if loads.ndim != 2:
+        raise GraspModuliError(f"task must have shape (k, 6), got {loads.shape}")
+    return loads
+
+
+def scaled_task(loads: Floats | None, length_scale: float) -> list[list[float]]:
+    """As the kernels take them, with torques over the length scale."""
+    if loads is None:
+        return []
+    return (loads / np.array([1.0, 1.0, 1.0, *[length_scale] * 3])).tolist()
 
 
 def _asked(

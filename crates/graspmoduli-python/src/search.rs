@@ -129,6 +129,7 @@ pub fn synthesize_many<'py>(
     square: PyReadonlyArray2<'py, f64>,
     allowed: Option<PyReadonlyArray2<'py, bool>>,
     limits: Limits,
+    task: Vec<[f64; 6]>,
     polished: bool,
     threads: usize,
 ) -> PyResult<Vec<Vec<f64>>> {
@@ -140,6 +141,7 @@ pub fn synthesize_many<'py>(
         top,
         region: region(cells.as_ref()),
         limits: &limits.0,
+        task: &task,
         polished,
     };
     let center = center_of_mass.into();

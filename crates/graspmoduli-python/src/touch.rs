@@ -27,9 +27,20 @@ type FoundGrasp<'py> = (
 
 /// What grasps are looked for: cone, centre of mass, size over length scale, fingers, how many,
 /// how far they are apart, errors of aim, are
-/// they polished, where fingers may go.
+/// they polished, where fingers may go, the task.
 #[derive(FromPyObject)]
-pub struct Request(Cone, [f64; 3], f64, usize, usize, f64, f64, bool, Limits);
+pub struct Request(
+    Cone,
+    [f64; 3],
+    f64,
+    usize,
+    usize,
+    f64,
+    f64,
+    bool,
+    Limits,
+    Vec<[f64; 6]>,
+);
 
 impl Request {
     fn wanted<'a>(&'a self, cone: &'a FrictionCone) -> Wanted<'a> {
@@ -43,6 +54,7 @@ impl Request {
             errors: self.6,
             rounds: if self.7 { polish::ROUNDS } else { 0 },
             limits: &self.8.0,
+            task: &self.9,
         }
     }
 }

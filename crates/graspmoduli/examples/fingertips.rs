@@ -53,6 +53,7 @@ fn main() -> Result<(), Error> {
         top: 3,
         apart: 0.1,
         errors: 0.025,
+        task: &[],
         rounds: ROUNDS,
         limits: &Limits::none(),
     };

@@ -6,9 +6,10 @@
 //! a step meets another, that one joins the bundle and the step is taken anew. Models are moved
 //! along with the grasp, and dropped when they are old.
 
+use crate::contact::FrictionCone;
 use crate::limits::Limits;
 use crate::nnls::shortest_step;
-use crate::quality::Evaluator;
+use crate::quality::{Evaluator, Twist, task_gradient, task_quality};
 use crate::region::Region;
 use crate::surface::{Placed, Surface};
 use glam::DVec3;
@@ -34,6 +35,9 @@ pub(crate) struct Ground<'a> {
     pub center: DVec3,
     pub region: &'a dyn Region,
     pub limits: &'a Limits,
+    /// The task, if the grasp is for one, and the fingers' friction cones.
+    pub task: &'a [Twist],
+    pub cone: &'a FrictionCone,
 }
 
 /// A facet's distance from the origin, linear in a step by arc length along u and θ.
@@ -51,17 +55,21 @@ impl Ground<'_> {
             4..=5 => self.climb_in::<10, 11>(evaluator, start),
             6..=8 => self.climb_in::<16, 17>(evaluator, start),
             9..=16 => self.climb_in::<32, 33>(evaluator, start),
-            _ => (start.to_vec(), self.quality(evaluator, start)),
+            _ => (start.to_vec(), self.value(evaluator, start)),
         }
     }
 
-    /// Q_l.
-    pub fn quality(&self, evaluator: &mut Evaluator, at: &[[f64; 2]]) -> f64 {
+    /// Q_l, or how much of the task can be done.
+    pub fn value(&self, evaluator: &mut Evaluator, at: &[[f64; 2]]) -> f64 {
         let contacts: Vec<_> = at
             .iter()
             .map(|&[u, theta]| self.surface.contact(u, theta))
             .collect();
-        evaluator.quality(&contacts, self.center)
+        if self.task.is_empty() {
+            evaluator.quality(&contacts, self.center)
+        } else {
+            task_quality(&contacts, self.center, self.cone, self.task)
+        }
     }
 
     fn placed(&self, at: &[[f64; 2]]) -> Vec<Placed> {
@@ -142,7 +150,11 @@ impl Ground<'_> {
     /// One of the nearest facets.
     fn facet<const D: usize>(&self, evaluator: &mut Evaluator, placed: &[Placed]) -> Facet<D> {
         let contacts: Vec<_> = placed.iter().map(|p| p.contact).collect();
-        let gradient = evaluator.gradient(&contacts, self.center);
+        let gradient = if self.task.is_empty() {
+            evaluator.gradient(&contacts, self.center)
+        } else {
+            task_gradient(&contacts, self.center, self.cone, self.task)
+        };
         let mut slopes = [0.0; D];
         for (k, own) in placed.iter().enumerate() {
             for axis in 0..2 {

@@ -12,7 +12,7 @@ use crate::math;
 use crate::parallel::*;
 use crate::places::search::{MANY, candidates};
 use crate::places::{Place, Wanted};
-use crate::quality::Evaluator;
+use crate::quality::{Evaluator, Twist};
 use crate::region::Region;
 use crate::sampling::by_area;
 use crate::surface::Surface;
@@ -36,11 +36,13 @@ pub struct Request<'a> {
     pub region: &'a dyn Region,
     /// Where fingers may go.
     pub limits: &'a Limits,
+    /// Loads that the grasp is for; none if it is for all.
+    pub task: &'a [Twist],
     /// Are grasps improved on the surface itself?
     pub polished: bool,
 }
 
-/// Different grasps, best first, and their Q_l: of those that differ but by a turn of a surface of
+/// Different grasps, best first, and how good they are, Q_l or how much of the task they can do: of those that differ but by a turn of a surface of
 /// revolution one, and further ones only where there are too few. `square` holds points of the unit
 /// square to sample the surface with.
 pub fn grasps(
@@ -71,6 +73,7 @@ pub fn grasps(
         top: request.top,
         apart: APART * surface.radius_about(center_of_mass, 16),
         errors: 0.0,
+        task: request.task,
         rounds: 0,
         limits,
     };
@@ -86,6 +89,8 @@ pub fn grasps(
         center: center_of_mass,
         region: request.region,
         limits,
+        task: request.task,
+        cone: request.cone,
     };
     let mut found: Vec<(Coordinates, f64)> = starts
         .par_iter()
@@ -94,7 +99,7 @@ pub fn grasps(
             if request.polished && !stop.load(Ordering::Relaxed) {
                 ground.climb(&mut evaluator, start)
             } else {
-                (start.clone(), ground.quality(&mut evaluator, start))
+                (start.clone(), ground.value(&mut evaluator, start))
             }
         })
         .filter(|found| found.1 > 0.0)

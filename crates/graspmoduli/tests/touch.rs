@@ -355,6 +355,7 @@ fn found(mesh: &Mesh, random: &[[f64; 3]], threads: usize) -> Vec<(Vec<Place>, f
         top: 3,
         apart: 0.075,
         errors: 0.025,
+        task: &[],
         rounds: ROUNDS,
         limits: &Limits::none(),
     };

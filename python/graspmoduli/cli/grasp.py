@@ -19,10 +19,12 @@ from .pipeline import (
     ObjectNumber,
     Opening,
     Table,
+    Task,
     constraints_of,
     find_grasps,
     image_of,
     scan_options,
+    task_of,
 )
 from .report import report
 from .table import show
@@ -81,6 +83,7 @@ def grasp(
     table: Table = None,
     approach: Approach = None,
     constraints: ConstraintsFile = None,
+    task: Task = None,
     camera: Camera = None,
     object_number: ObjectNumber = None,
     keep_table: KeepTable = False,
@@ -110,6 +113,7 @@ def grasp(
         center = [number("center_of_mass", text, float) for text in center_of_mass]
         options["center_of_mass"] = _arrays.floats("center_of_mass", center)
     options["constraints"] = constraints_of(constraints, opening, table, approach)
+    options["task"] = task_of(task)
     scan = scan_options(camera, object_number, keep_table)
     # Outputs that cannot be written are found out before the work; all are written at its end.
     check_outputs(thing, json=json_file, picture=picture)

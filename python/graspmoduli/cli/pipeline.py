@@ -44,6 +44,14 @@ Approach = Annotated[
         help="No finger presses at more than the angle A, in radians, from this direction.",
     ),
 ]
+Task = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|gravity",
+        help="What OBJECT is held for: wrenches on it about its centre of mass, rows of six "
+        "numbers; or the weight of one unit of mass in any direction. Ranks by it.",
+    ),
+]
 ConstraintsFile = Annotated[
     Path | None,
     typer.Option(
@@ -73,6 +81,15 @@ def constraints_of(
     if path is None:
         return Constraints(**given)
     return dataclasses.replace(Constraints.load(path), **given)
+
+
+def task_of(text: str | None) -> Any:
+    """The wrenches of a task, if one is asked for."""
+    if text is None:
+        return None
+    from ..tasks import gravity, read_task
+
+    return gravity(1.0) if text == "gravity" else read_task(text)
 
 
 def scan_options(

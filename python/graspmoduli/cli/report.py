@@ -74,6 +74,8 @@ def _grasp_report(grasp: Any) -> dict[str, Any]:
         report["exact_quality"] = grasp.exact_quality
         report["low_quality"] = grasp.low_quality
         report["held"] = grasp.held
+    if grasp.task_quality is not None:
+        report["task_quality"] = grasp.task_quality
     if grasp.checks is not None:
         report["checks"] = [
             # The fitted surface is the only part that is known.

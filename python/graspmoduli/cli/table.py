@@ -55,7 +55,10 @@ TIE = 0.05
 def _words(fit: Any, grasps: Any) -> list[str]:
     """Which grasps are as good as each other, and how sure their contacts are."""
     words = []
-    values = [grasp.round_quality[0] for grasp in grasps]
+    task = grasps[0].task_quality is not None
+    if task:
+        words.append("task: the multiple of all of the task's wrenches that such forces resist.")
+    values = [grasp.task_quality if task else grasp.round_quality[0] for grasp in grasps]
     equal = sum(value >= (1.0 - TIE) * max(values) for value in values)
     if equal > 1:
         words.append(f"A tie: {equal} of the grasps are within {TIE:.0%} of the best.")
@@ -83,7 +86,8 @@ def _words(fit: Any, grasps: Any) -> list[str]:
 def table_of(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
     """Grasps by rank: fingers side by side, or one below the other where it is narrow."""
     table = Table(box=None, padding=(0, 1 if stacked else 2), header_style="bold")
-    columns = ["#", "Q", _name(grasps, edges)]
+    task = bool(grasps) and grasps[0].task_quality is not None
+    columns = ["#", *(["task"] if task else []), "Q", _name(grasps, edges)]
     if stacked:
         columns += ["finger", "(x, y, z)"]
     else:
@@ -97,9 +101,11 @@ def table_of(grasps: Any, edges: int, digits: int, *, stacked: bool) -> Table:
             for point in grasp.contacts
         ]
         head = [str(rank), f"{grasp.round_quality[0]:.4f}", f"{grasp.quality:.4f}"]
+        if task:
+            head.insert(1, f"{grasp.task_quality:.4g}")
         if stacked:
             for finger, point in enumerate(points, 1):
-                table.add_row(*(head if finger == 1 else ["", "", ""]), str(finger), point)
+                table.add_row(*(head if finger == 1 else [""] * len(head)), str(finger), point)
         else:
             table.add_row(*head, *points)
     return table

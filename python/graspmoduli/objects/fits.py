@@ -15,11 +15,20 @@ from .._core import GraspModuliError
 from ..constraints import Constraints, a_constraint, raise_for_none
 from ..grasps import Grasp
 from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, check_fingers, many_grasps, synthesize
+from ..tasks import one_task, scaled_task
 from ..transfers import transfer
 from .fitted import Fitted
 from .likeness import cells, ways
 from .mesh_grasps import APART, Pressed, Search, press, search
-from .object_grasps import ObjectGrasp, by_errors, by_evidence, by_round_cones, differ
+from .object_grasps import (
+    ObjectGrasp,
+    by_errors,
+    by_evidence,
+    by_round_cones,
+    by_task,
+    differ,
+    for_task,
+)
 from .reading import read
 from .touching import TIP, tip
 from .walls import CLOSE
@@ -46,6 +55,7 @@ class Fit(Fitted):
         tip_radius: float | None = None,
         errors: float | None = None,
         constraints: Constraints | None = None,
+        task: ArrayLike | None = None,
     ) -> list[ObjectGrasp]:
         """Different grasps of high quality in the object's own coordinates, best first.
 
@@ -93,6 +103,10 @@ class Fit(Fitted):
             that nine of ten errors leave.
         constraints
             Where fingers may go and what they must hold.
+        task
+            Loads that grasps are for, forces and torques on the object about its centre of mass,
+            as for :func:`graspmoduli.task_quality`; shape (k, 6). Then grasps climb in task
+            quality and are ranked by it.
 
         Raises
         ------
@@ -103,30 +117,37 @@ class Fit(Fitted):
         many = count("top", top, 1, MOST_FOLLOWED)
         hand = fingers(friction, edges, size, torsion, norm)
         check_fingers(size, hand)
+        loads = one_task(task)
         start = count("seed", seed, 0)
         asked = a_constraint("constraints", constraints)
         center = self._center(asked.center_of_mass if center_of_mass is None else center_of_mass)
         if self.mesh is None:
 
             def of_cloud(own: Constraints) -> list[ObjectGrasp]:
-                return self._of_cloud(size, many, hand, start, center, tip_radius, errors, own)
+                return self._of_cloud(
+                    size, many, hand, start, center, tip_radius, errors, own, loads
+                )
 
-            held = of_cloud(asked)
-            if not held and asked.given:
+            found = of_cloud(asked)
+            if not found and asked.given:
                 raise_for_none(asked, of_cloud)
-            return held
+            if loads is not None:
+                found = sorted(for_task(found, loads), key=by_task, reverse=True)
+            return found[:many]
         radius = tip(self.mesh, tip_radius)
         aim = self._errors(errors, 0.5 * radius * self.mesh.size)
         # Equal ones stay in the order of their Q_l.
         key = by_round_cones if errors is None else by_errors
-        wanted = Search(hand, center, self.length_scale, size, many, aim, asked)
+        if loads is not None:
+            key = by_task
+        wanted = Search(hand, center, self.length_scale, size, many, aim, asked, loads)
         found = self._of_mesh(radius, start, wanted)
         if not found and asked.given:
             raise_for_none(
                 asked,
                 lambda own: self._of_mesh(radius, start, wanted._replace(constraints=own, top=1)),
             )
-        return sorted(found, key=key, reverse=True)[:many]
+        return sorted(for_task(found, loads), key=key, reverse=True)[:many]
 
     def _of_mesh(self, radius: float, seed: int, wanted: Search) -> list[ObjectGrasp]:
         """Grasps pressed on the mesh that keep all constraints."""
@@ -186,6 +207,7 @@ class Fit(Fitted):
         tip_radius: float | None,
         errors: float | None,
         asked: Constraints,
+        task: Floats | None,
     ) -> list[ObjectGrasp]:
         mu, edges, torsion, each = hand
         if errors is not None:
@@ -205,7 +227,7 @@ class Fit(Fitted):
                 allowed = asked.cells(self.surface, self.pose, allowed, radius)
             if not allowed.any():
                 continue
-            if size == 3 and torsion == 0.0 and not each and not asked.given:
+            if size == 3 and torsion == 0.0 and not each and not asked.given and task is None:
                 # Where contacts are not allowed everywhere, more starts find better grasps.
                 found = synthesize(
                     self.unit_surface,
@@ -223,8 +245,9 @@ class Fit(Fitted):
                 unit = (mu, edges, torsion / scale, each)
                 many = min(4 * top + 4, MOST_FOLLOWED)
                 found = many_grasps(
-                    self.unit_surface, (x, y, z), unit, size, many, seed, allowed, pairs
-                )
+                    self.unit_surface, (x, y, z), unit, size, many, seed, allowed, pairs,
+                    self._turned(task, scale),
+                )  # fmt: skip
             # The edges of polygonal cones are laid out in the coordinates' axes, so that Q_l in
             # those of the object differs slightly from the surface's own.
             ranked = []
@@ -241,8 +264,17 @@ class Fit(Fitted):
                 first = max(ranked, key=lambda pair: pair[0])[1]
                 # Others may promise more, but with less to go by.
                 rest = [one for _, one in ranked if by_round_cones(one) <= by_round_cones(first)]
+                if task is not None:
+                    return [one for _, one in ranked]
                 return sorted(rest, key=by_round_cones, reverse=True)[:top]
         return []
+
+    def _turned(self, task: Floats | None, scale: float) -> list[list[float]]:
+        """Loads in the coordinates of the fitted surface divided by ``scale``."""
+        if task is None:
+            return []
+        turned = (task.reshape(-1, 2, 3) @ self.pose[:3, :3]).reshape(-1, 6)
+        return scaled_task(turned, scale)
 
     def _pressed_on_points(
         self, flat: ObjectGrasp, hand: Cone, center: Floats, radius: float

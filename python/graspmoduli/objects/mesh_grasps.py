@@ -12,6 +12,7 @@ from .. import _core
 from .._arrays import Floats, NoGraspLeftError, cores
 from .._batches import Cone
 from ..constraints import Constraints
+from ..tasks import scaled_task
 from .touching import BEARING, NORMAL, POINT, SAMPLES, ContactCheck, TriangleMesh, places
 
 #: Samples of a mesh if only a part of it is to be grasped, or few places are allowed; and if even
@@ -48,6 +49,8 @@ class Search(NamedTuple):
     errors: float
     #: Where fingers may go.
     constraints: Constraints
+    #: Loads that grasps are for, (k, 6) with torques in the object's unit; None if for all.
+    task: Floats | None = None
     #: Do grasps climb on the mesh itself, or only from place to place?
     polished: bool = True
 
@@ -163,6 +166,7 @@ def _request(mesh: TriangleMesh, radius: float, wanted: Search) -> Any:
         wanted.errors / mesh.size,
         wanted.polished,
         wanted.constraints.limits(radius * mesh.size, mesh.middle, mesh.size),
+        scaled_task(wanted.task, wanted.length_scale),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from .._arrays import Floats
 from ..grasps import Grasp, PlacedGrasp
 from ..quality import circular_quality
 from ..surfaces import Surface
+from ..tasks import task_quality
 from .touching import ContactCheck
 
 #: Half of the friction stands for what a scan does not tell; what is left then counts, and so does
@@ -59,6 +60,8 @@ class ObjectGrasp(PlacedGrasp):
     held: float | None = None
     #: Q_l that nine of ten of these errors leave.
     low_quality: float | None = None
+    #: How much of the task it can do that it was looked for: :func:`graspmoduli.task_quality`.
+    task_quality: float | None = None
 
 
 def by_round_cones(grasp: ObjectGrasp) -> float:
@@ -69,6 +72,18 @@ def by_round_cones(grasp: ObjectGrasp) -> float:
 def by_errors(grasp: ObjectGrasp) -> float:
     """What ranks a grasp under errors of aim."""
     return 0.0 if grasp.low_quality is None else grasp.low_quality
+
+
+def by_task(grasp: ObjectGrasp) -> float:
+    """What ranks a grasp for a task."""
+    return 0.0 if grasp.task_quality is None else grasp.task_quality
+
+
+def for_task(grasps: list[ObjectGrasp], loads: Floats | None) -> list[ObjectGrasp]:
+    """Grasps that know how much of a task they can do."""
+    if loads is None:
+        return grasps
+    return [replace(one, task_quality=task_quality(one, task=loads)) for one in grasps]
 
 
 def by_evidence(flat: ObjectGrasp, pressed: ObjectGrasp) -> float:

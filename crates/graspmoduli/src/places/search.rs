@@ -19,6 +19,8 @@ const MOST_PLACES: usize = 400;
 const NEIGHBOURS: usize = 16;
 /// How many of the best subsets are looked at for each grasp that is wanted; then, if they are too
 /// much alike.
+/// The same, for a task: what is best for all loads need not be best for a few.
+const OF_A_TASK: usize = 1_000;
 pub(crate) const MANY: [usize; 2] = [40, 200];
 
 /// Different grasps on a map that no step to a neighbour improves, best first.
@@ -51,15 +53,27 @@ pub(crate) fn candidates(
             DVec3::ZERO,
             &cone,
             wanted.fingers,
-            many * wanted.top.max(5),
+            if wanted.task.is_empty() {
+                many * wanted.top.max(5)
+            } else {
+                OF_A_TASK.max(many * wanted.top)
+            },
             threads,
             together.as_ref(),
             heed,
         )?;
-        let grasps = ranked
+        let mut grasps: Vec<Vec<Place>> = ranked
             .iter()
-            .map(|r| r.indices.iter().map(|&k| map[spread[k]]).collect());
-        starts = different(grasps, 6 * wanted.top, wanted);
+            .map(|r| r.indices.iter().map(|&k| map[spread[k]]).collect())
+            .collect();
+        if !wanted.task.is_empty() {
+            let valued = grasps.into_par_iter().map(|grasp| {
+                let mut evaluator = Evaluator::new(wanted.cone);
+                (wanted.value(&mut evaluator, &grasp), grasp)
+            });
+            grasps = best_first(valued.collect()).collect();
+        }
+        starts = different(grasps.into_iter(), 6 * wanted.top, wanted);
         if starts.len() >= wanted.candidates() {
             break;
         }
@@ -218,12 +232,12 @@ fn climb(
     let index = |place: &Place| map.iter().position(|other| other == place).unwrap_or(0);
     let mut at: Vec<usize> = start.iter().map(index).collect();
     let grasp = |at: &[usize]| at.iter().map(|&k| map[k]).collect::<Vec<_>>();
-    let mut best = wanted.quality(evaluator, &grasp(&at));
+    let mut best = wanted.value(evaluator, &grasp(&at));
     if !wanted.cone.is_uniform() {
         // Which finger goes where.
         for order in permutations(at.len()) {
             let other: Vec<_> = order.iter().map(|&k| at[k]).collect();
-            let quality = wanted.quality(evaluator, &grasp(&other));
+            let quality = wanted.value(evaluator, &grasp(&other));
             if quality > best {
                 (best, at) = (quality, other);
             }

@@ -3,7 +3,7 @@
 use super::Place;
 use crate::contact::{Contact, FrictionCone};
 use crate::limits::Limits;
-use crate::quality::Evaluator;
+use crate::quality::{Evaluator, Twist, task_quality, task_quality_above};
 use glam::DVec3;
 
 /// A step must raise the quality by this share of it.
@@ -26,6 +26,9 @@ pub struct Wanted<'a> {
     pub apart: f64,
     /// Errors of aim, a length, under which grasps are tried.
     pub errors: f64,
+    /// Loads that the grasp is for, forces and torques on the object about its centre of mass,
+    /// torques over the length scale; none if it is for all.
+    pub task: &'a [Twist],
     /// Rounds of the ascent on the mesh itself.
     pub rounds: usize,
     /// Where fingers may go.
@@ -53,7 +56,16 @@ impl Wanted<'_> {
         evaluator.quality(&self.contacts(places), DVec3::ZERO)
     }
 
-    /// Q_l if it is more than `best`.
+    /// How good a grasp is: Q_l, or how much of the task it can do.
+    pub(crate) fn value(&self, evaluator: &mut Evaluator, places: &[Place]) -> f64 {
+        if self.task.is_empty() {
+            self.quality(evaluator, places)
+        } else {
+            task_quality(&self.contacts(places), DVec3::ZERO, self.cone, self.task)
+        }
+    }
+
+    /// How good it is, if that is more than `best`.
     pub(crate) fn better(
         &self,
         evaluator: &mut Evaluator,
@@ -61,6 +73,10 @@ impl Wanted<'_> {
         best: f64,
     ) -> Option<f64> {
         let bar = best * (1.0 + GAIN);
+        if !self.task.is_empty() {
+            let contacts = self.contacts(places);
+            return task_quality_above(&contacts, DVec3::ZERO, self.cone, self.task, bar);
+        }
         let quality = evaluator.quality_up_to(&self.contacts(places), DVec3::ZERO, bar);
         (quality > bar).then_some(quality)
     }

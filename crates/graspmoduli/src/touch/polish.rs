@@ -31,7 +31,7 @@ pub fn polish(
 ) -> Vec<Place> {
     let steady = grasp.iter().all(|place| place.steady);
     let mut at = grasp.to_vec();
-    let mut best = wanted.quality(evaluator, &at);
+    let mut best = wanted.value(evaluator, &at);
     let mut step = STEP;
     for _ in 0..rounds {
         let before = best;

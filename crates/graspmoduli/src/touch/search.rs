@@ -29,6 +29,8 @@ pub struct Found {
     pub places: Vec<Place>,
     /// Q_l with the normals that they feel.
     pub quality: f64,
+    /// How good it is for what is wanted: Q_l, or how much of a task it can do.
+    pub value: f64,
     /// What the mesh says of it.
     pub checked: Checked,
 }
@@ -59,7 +61,7 @@ pub fn grasps(
     }
     // Bad aim loses what steady places offer: then others must offer much more.
     let others = true_grasps(mesh, tip, map, wanted, threads, stop)?;
-    let best = |grasps: &[Found]| grasps.first().map_or(0.0, |grasp| grasp.quality);
+    let best = |grasps: &[Found]| grasps.first().map_or(0.0, |grasp| grasp.value);
     if best(&found) > 0.0 && best(&others) < MUCH * best(&found) {
         return Ok(found);
     }
@@ -95,7 +97,7 @@ fn flattest(
     let mut evaluator = Evaluator::new(wanted.cone);
     let mut best = |places: &[Place]| -> Result<f64, Error> {
         let grasps = candidates(places, wanted, &MANY[..1], threads, stop)?;
-        let values = grasps.iter().map(|g| wanted.quality(&mut evaluator, g));
+        let values = grasps.iter().map(|g| wanted.value(&mut evaluator, g));
         Ok(values.fold(0.0, f64::max))
     };
     let bar = SHARE * best(map)?;
@@ -136,7 +138,7 @@ fn checked(
             return Err(Error::Interrupted);
         }
         let mut found: Vec<_> = found.into_iter().flatten().collect();
-        found.sort_by(|a, b| b.quality.total_cmp(&a.quality));
+        found.sort_by(|a, b| b.value.total_cmp(&a.value));
         for grasp in found {
             let mut others = kept.iter();
             if others.all(|other| wanted.differ(&grasp.places, &other.places)) {
@@ -147,10 +149,10 @@ fn checked(
             break;
         }
     }
-    kept.sort_by(|a, b| b.quality.total_cmp(&a.quality));
+    kept.sort_by(|a, b| b.value.total_cmp(&a.value));
     // The first is one that bad aim does not lose, if there is any that is half as good.
-    let half = kept.first().map_or(0.0, |grasp| 0.5 * grasp.quality);
-    let sure = |grasp: &Found| grasp.checked.holds >= SURE && grasp.quality >= half;
+    let half = kept.first().map_or(0.0, |grasp| 0.5 * grasp.value);
+    let sure = |grasp: &Found| grasp.checked.holds >= SURE && grasp.value >= half;
     if let Some(first) = kept.iter().position(sure) {
         kept.drain(..first);
     }
@@ -176,6 +178,7 @@ pub fn climbed(
         let quality = wanted.quality(&mut evaluator, &places);
         let checked = gate::check(mesh, tip, &places, quality, wanted, &mut evaluator)?;
         Some(Found {
+            value: wanted.value(&mut evaluator, &places),
             places,
             quality,
             checked,

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._arrays import Floats, brief, count, finite, locked, number, unit, vectors
-from ._batches import GraspLike
-from ._core import GraspModuliError
-from ._values import Value
-from .grasps import Grasp, place
-from .halfspaces import facet_normals
-from .objects.fits import Fit
-from .objects.touching import NORMAL, POINT, TIP, places
-from .sampling import sample_points
-from .surfaces import Surface
-from .wrench_space import WrenchSpace
+from .._arrays import Floats, brief, count, finite, locked, number, unit, vectors
+from .._batches import GraspLike
+from .._core import GraspModuliError
+from .._values import Value
+from ..grasps import Grasp, place
+from ..halfspaces import facet_normals
+from ..sampling import sample_points
+from ..surfaces import Surface
+from ..wrench_space import WrenchSpace
+from .fits import Fit
+from .touching import NORMAL, POINT, TIP, places
 
 #: A corner lies on a facet that is at most this far, relative to the facet's distance: to ask more
 #: of it is safe.
