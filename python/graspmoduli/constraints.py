@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import _core
 from ._arrays import (
@@ -19,9 +19,7 @@ from ._arrays import (
     a_callback,
     a_path,
     brief,
-    floats,
     number,
-    numbers,
     vectors,
 )
 from ._core import GraspModuliError
@@ -29,6 +27,17 @@ from ._files import read_toml
 from ._values import Value
 from .measures import measures
 from .tasks import gravity
+from .zones import (
+    Booleans,
+    a_table,
+    a_vector,
+    an_approach,
+    an_opening,
+    at_least_zero,
+    inside,
+    moved,
+    regions_of,
+)
 
 #: Constraints are met with this to spare, over the object's size: rounding breaks none.
 SPARE = 1e-9
@@ -37,11 +46,6 @@ WAY = 4.0
 
 #: Cells of a surface, over u and θ, of which regions are asked.
 GRID = (64, 128)
-
-Booleans = NDArray[np.bool_]
-#: A box or half-space as the kernels take it: is it a box, and its corners or point and normal.
-Vector = tuple[float, float, float]
-Zone = tuple[bool, Vector, Vector]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,15 +105,15 @@ class Constraints(Value):
     accept: Callable[[Floats, Floats], Any] | None = None
 
     def __post_init__(self) -> None:
-        self._keep("opening", _opening(self.opening))
+        self._keep("opening", an_opening(self.opening))
         if self.gap is not None:
-            self._keep("gap", _at_least_zero("gap", self.gap))
-        self._keep("approach", _approach(self.approach))
-        self._keep("table", None if self.table is None else _table(self.table))
+            self._keep("gap", at_least_zero("gap", self.gap))
+        self._keep("approach", an_approach(self.approach))
+        self._keep("table", None if self.table is None else a_table(self.table))
         for name in ("forbidden", "wanted", "unwanted"):
-            self._keep(name, _regions(name, getattr(self, name)))
+            self._keep(name, regions_of(name, getattr(self, name)))
         if self.center_of_mass is not None:
-            self._keep("center_of_mass", _vector("center_of_mass", self.center_of_mass))
+            self._keep("center_of_mass", a_vector("center_of_mass", self.center_of_mass))
         for name in ("payload", "force"):
             if getattr(self, name) is not None:
                 self._keep(name, number(name, getattr(self, name), positive=True))
@@ -155,7 +159,7 @@ class Constraints(Value):
             raise GraspModuliError(
                 f"contacts and normals must have shape (m, 3), got {points.shape} and {ways.shape}"
             )
-        limits = self.limits(_at_least_zero("tip_radius", tip_radius), spare=0.0)
+        limits = self.limits(at_least_zero("tip_radius", tip_radius), spare=0.0)
         pairs = _core.pairs_allowed(limits, points, ways)
         return (
             bool(self.places(points, ways, limits).all())
@@ -169,10 +173,10 @@ class Constraints(Value):
         allowed = _core.places_allowed(limits, points, np.ascontiguousarray(normals))
         # Zones have been asked: of several regions one is enough.
         if any(not isinstance(region, tuple) for region in self.wanted):
-            allowed &= np.any([_inside("wanted", one, points) for one in self.wanted], axis=0)
+            allowed &= np.any([inside("wanted", one, points) for one in self.wanted], axis=0)
         for region in self.unwanted:
             if not isinstance(region, tuple):
-                allowed &= ~_inside("unwanted", region, points)
+                allowed &= ~inside("unwanted", region, points)
         return allowed
 
     def hold(self, grasp: Any) -> bool:
@@ -262,12 +266,10 @@ class Constraints(Value):
             radius,
             WAY * radius,
             approach,
-            [_moved(zone, at, size, spare) for zone in (*self.forbidden, *table)],
+            [moved(zone, at, size, spare) for zone in (*self.forbidden, *table)],
             # Beside regions that only Python knows, zones are asked there.
-            [_moved(zone, at, size, -spare) for zone in own]
-            if len(own) == len(self.wanted)
-            else [],
-            [_moved(zone, at, size, spare) for zone in self.unwanted if isinstance(zone, tuple)],
+            [moved(zone, at, size, -spare) for zone in own] if len(own) == len(self.wanted) else [],
+            [moved(zone, at, size, spare) for zone in self.unwanted if isinstance(zone, tuple)],
         )
 
 
@@ -304,131 +306,3 @@ def raise_for_none(asked: Constraints, found: Callable[[Constraints], Sequence[A
 
 #: Values of two parts, and what tables of a TOML file call them.
 PAIRS = {"approach": ("direction", "half_angle"), "table": ("point", "normal")}
-
-
-def _opening(value: Any) -> tuple[float, float] | None:
-    if value is None:
-        return None
-    pair = numbers("opening", value)
-    if pair.shape != (2,) or not 0.0 <= pair[0] < pair[1]:
-        raise GraspModuliError(
-            f"opening must be a least distance and a larger one, 0 or positive, got {brief(value)}"
-        )
-    return float(pair[0]), float(pair[1])
-
-
-def _approach(value: Any) -> tuple[Vector, float] | None:
-    if value is None:
-        return None
-    direction, angle = _two("approach", value, "a direction (3,) and a half-angle")
-    half = number("approach's half-angle", angle, positive=True)
-    if half > math.pi:
-        raise GraspModuliError(f"approach's half-angle must be at most π, got {half:g}")
-    return _unit("approach's direction", direction), half
-
-
-def _table(value: Any) -> tuple[Vector, Vector]:
-    point, normal = _two("table", value, "a point (3,) and a normal (3,)")
-    return _vector("table's point", point), _unit("table's normal", normal)
-
-
-def _two(name: str, value: Any, wanted: str) -> tuple[Any, Any]:
-    try:
-        one, other = value
-    except (TypeError, ValueError):
-        raise GraspModuliError(f"{name} must be {wanted}, got {brief(value)}") from None
-    return one, other
-
-
-def _at_least_zero(name: str, value: Any) -> float:
-    found = number(name, value)
-    if found < 0.0:
-        raise GraspModuliError(f"{name} must be 0 or positive, got {found:g}")
-    return found
-
-
-def _vector(name: str, value: Any) -> Vector:
-    array = floats(name, value)
-    if array.shape != (3,):
-        raise GraspModuliError(f"{name} must have shape (3,), got {array.shape}")
-    x, y, z = array.tolist()
-    return x, y, z
-
-
-def _unit(name: str, value: Any) -> Vector:
-    vector = np.array(_vector(name, value))
-    largest = float(np.abs(vector).max())
-    if largest == 0.0:
-        raise GraspModuliError(f"{name} must not be 0, got {brief(value)}")
-    vector /= largest
-    x, y, z = (vector / math.sqrt(float((vector * vector).sum()))).tolist()
-    return x, y, z
-
-
-def _regions(name: str, value: Any) -> tuple[Any, ...]:
-    if isinstance(value, Mapping) or callable(value) or hasattr(value, "contains"):
-        value = [value]
-    try:
-        given = list(value)
-    except TypeError:
-        raise GraspModuliError(
-            f"{name} must be a list of {WANTED[name]}, got {brief(value)}"
-        ) from None
-    return tuple(_region(name, one) for one in given)
-
-
-WANTED = {
-    "forbidden": "boxes and half-spaces",
-    "wanted": "regions",
-    "unwanted": "regions",
-}
-
-
-def _region(name: str, value: Any) -> Any:
-    if name != "forbidden" and (callable(value) or hasattr(value, "contains")):
-        return value
-    if isinstance(value, Mapping):
-        if set(value) == {"point", "normal"}:
-            point = _vector(f"{name}'s point", value["point"])
-            return (False, point, _unit(f"{name}'s normal", value["normal"]))
-        if set(value) != {"low", "high"}:
-            raise GraspModuliError(
-                f"{name} must have low and high, or point and normal, got {brief(dict(value))}"
-            )
-        pair: Any = (value["low"], value["high"])
-    elif isinstance(value, tuple) and len(value) == 3 and isinstance(value[0], bool):
-        return value
-    else:
-        pair = _two(name, value, "boxes (low, high) or tables of point and normal")
-    low, high = (numbers(f"{name}'s box", corner) for corner in pair)
-    if low.shape != (3,) or high.shape != (3,) or not (low < high).all():
-        raise GraspModuliError(
-            f"{name} must be boxes of a lower and a higher corner, (3,) each, got {brief(value)}"
-        )
-    return (True, tuple(low.tolist()), tuple(high.tolist()))
-
-
-def _moved(zone: Zone, middle: Floats, size: float, spare: float) -> Zone:
-    """In the kernels' coordinates, larger by ``spare``."""
-    is_box, one, other = zone
-    if is_box:
-        low, high = ((np.array(corner) - middle) / size for corner in (one, other))
-        return True, tuple((low - spare).tolist()), tuple((high + spare).tolist())
-    point = (np.array(one) - middle) / size + spare * np.array(other)
-    return False, tuple(point.tolist()), other
-
-
-def _inside(name: str, region: Any, points: Floats) -> Booleans:
-    """Do points lie in a region?"""
-    if isinstance(region, tuple):
-        is_box, one, other = region
-        if is_box:
-            return ((points >= one) & (points <= other)).all(axis=1)
-        return ((points - one) * other).sum(axis=1) <= 0.0
-    answer = np.asarray(region.contains(points) if hasattr(region, "contains") else region(points))
-    if answer.dtype != np.bool_ or answer.shape != (len(points),):
-        raise GraspModuliError(
-            f"{name} must say for each of {len(points)} points whether it lies in the region, got "
-            f"an answer of type {answer.dtype} and shape {answer.shape}"
-        )
-    return answer

@@ -5,6 +5,7 @@
 
 mod apex_ray_face;
 mod batch;
+mod effort;
 mod evaluator;
 mod force_closure;
 mod given;
