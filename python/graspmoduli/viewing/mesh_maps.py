@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from .._arrays import Floats
 from .._batches import contact_frames
 from .._core import GraspModuliError
+from ..objects.contact_regions import ContactRegions
 from ..objects.fits import Fit
 from ..objects.parts import Parts
 from ..objects.touching import ContactMap
@@ -54,6 +55,25 @@ def plot_parts(parts: Parts, *, title: str = "") -> Figure:
         loc="lower center", ncols=min(len(names), 5), frameon=False, fontsize=9,
     )  # fmt: skip
     figure.suptitle(title or f"{len(parts)} parts", fontsize=13)
+    return figure
+
+
+def plot_contact_regions(fit: Fit, regions: ContactRegions, *, title: str = "") -> Figure:
+    """Where each finger may land independently of the others, from two sides: a colour each."""
+    colors = [LINES[k % len(LINES)][0] for k in range(len(regions))]
+    points = np.concatenate([region.contacts for region in regions])
+    normals = np.concatenate([region.normals for region in regions])
+    shades = np.concatenate(
+        [np.tile(to_rgba(c), (len(r.contacts), 1)) for c, r in zip(colors, regions, strict=True)]
+    )
+    figure = _discs(fit, points, normals, shades, 0.008 * fit.residual.size)
+    names = [f"finger {k}  {region.area:.3g}" for k, region in enumerate(regions, 1)]
+    figure.legend(
+        handles=_marks(colors, names), loc="lower center", ncols=min(len(names), 5),
+        frameon=False, fontsize=9,
+    )  # fmt: skip
+    said = f"Q ≥ {regions.threshold:.3g} wherever in these the fingers land"
+    figure.suptitle(f"{title}    {said}".strip(), fontsize=13)
     return figure
 
 
