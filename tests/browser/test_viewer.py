@@ -15,12 +15,15 @@ from playwright.sync_api import sync_playwright
 
 import graspmoduli as gm
 from conftest import ROOT
+from graspmoduli.cli.report import report
 from graspmoduli.objects.fitting import fit_object
 from graspmoduli.objects.reading import read
-from graspmoduli.viewing.browser import pointing
-from graspmoduli.viewing.browser.grasp_page import GraspPage
-from graspmoduli.viewing.browser.server import open_server
+from graspmoduli.viewing import pointing
+from graspmoduli.viewing.browser import triangle
+from graspmoduli.viewing.browser.grasp_page import Shown
+from graspmoduli.viewing.browser.server import add_pages, open_server
 from graspmoduli.viewing.browser.shapes_page import ShapePage
+from graspmoduli.viewing.held import Hand
 
 OBJECT = ROOT / "examples" / "objects" / "yogurt_bottle.ply"
 #: Software rendering, and nothing fetched behind our back.
@@ -56,16 +59,20 @@ def found():
     return thing, fit, fit.synthesize(top=3)
 
 
+def shown_of(found, **options):
+    hand = Hand(**options)
+    return Shown(*found, hand, "bottle.ply", report=report_of(found))
+
+
+def report_of(found):
+    return lambda grasps, hand: report("bottle.ply", *found[:2], grasps, *hand[:2], hand.norm)
+
+
 @pytest.fixture
 def served(found):
     """A server and the pages that it made, in the order of their browsers."""
     server = open_server(0)
-    pages = []
-
-    @server.on_client_connect
-    def _(client):
-        pages.append(GraspPage(client, *found, 1.0, 8, "bottle"))
-
+    pages = add_pages(server, shown_of(found))
     yield f"http://127.0.0.1:{server.get_port()}", pages
     server.stop()
 
@@ -163,39 +170,39 @@ def test_a_slider_changes_the_quality(browser, served, found):
     window.page.close()
 
 
-def test_a_drag_moves_a_contact_along_the_surface(browser, served):
+def test_a_drag_moves_a_fingertip_along_the_object(browser, served, found):
     address, pages = served
     window = ready(Window(browser, address))
-    page = pages[-1]
-    # On the fitted surface, where a drag moves contacts.
-    page.show(page.grasp)
+    page, fit = pages[-1], found[1]
+    settled(page)
+    before, value = page.held, window.quality()
     eye = np.asarray(page.client.camera.position)
-    placed = gm.place(page.surface, page.grasp)
+    balls = np.array([ball.position for ball in page.balls])
+    normals = before.normals @ fit.pose[:3, :3]
     # The contact that faces the eye most.
-    facing = ((eye - placed.contacts) * -placed.normals).sum(1)
-    index = int(facing.argmax())
-    before, value = page.grasp, window.quality()
-    x, y = on_screen(page, window, placed.contacts[index])
-    mouse = window.page.mouse
-    mouse.move(x, y)
-    mouse.down()
-    for step in range(1, 9):
-        mouse.move(x, y - 6 * step)
-        time.sleep(0.1)
-    mouse.up()
-    wait(lambda: page.grasp.u[index] > before.u[index] + 0.01)
+    index = int(((eye - balls) * -normals).sum(1).argmax())
+    x, y = on_screen(page, window, balls[index])
+    drag(window, (x, y), (x, y - 60))
+    wait(lambda: not np.array_equal(page.held.contacts, before.contacts))
     wait(
-        lambda: window.quality() == pytest.approx(page.fit.in_object(page.grasp).quality, abs=1e-4)
+        lambda: window.quality() == pytest.approx(page.touch.worth(page.held, page.hand), abs=1e-4)
     )
-    after = page.grasp
-    # That finger went up, the others stayed.
-    assert after.u[index] > before.u[index] + 0.01
+    after = page.held
     others = [k for k in range(3) if k != index]
-    np.testing.assert_array_equal(after.u[others], before.u[others])
-    assert window.quality() != value
-    np.testing.assert_allclose(
-        page.spheres[index].position, gm.place(page.surface, after).contacts[index], atol=1e-6
+    np.testing.assert_array_equal(after.contacts[others], before.contacts[others])
+    # That finger is on the mesh, higher up.
+    local = np.stack(
+        [(one.contacts[index] - fit.pose[:3, 3]) @ fit.pose[:3, :3] for one in (before, after)]
     )
+    assert local[1, 2] > local[0, 2]
+    near = fit.mesh.core.nearest(fit.mesh.local(after.contacts))
+    assert np.abs(near - fit.mesh.local(after.contacts)).max() < 1e-6
+    assert window.quality() != value
+    assert "modified" in window.page.locator("[data-modified]").inner_text()
+    # One undo takes the whole drag back.
+    window.page.get_by_role("button", name="Undo").click()
+    wait(lambda: window.quality() == pytest.approx(value, abs=1e-4))
+    assert "modified" not in window.page.locator("[data-modified]").inner_text()
     window.page.close()
 
 
@@ -217,46 +224,98 @@ def test_two_browsers_do_not_disturb_each_other(browser, served, found):
     third.page.close()
 
 
-def test_the_ascent_climbs(browser, served, found):
+def test_improve_helps_at_once_and_can_be_undone(browser, served, found):
     address, pages = served
     window = ready(Window(browser, address))
     page = pages[-1]
-    best = found[1].on_surface(found[2][0])
-    worse = gm.Grasp(0.9 * best.u + 0.05, best.theta + np.array([0.0, 0.3, 0.0]))
-    page.show(worse)
-    start = found[1].in_object(worse).quality
-    assert 0.0 < start < 0.8 * found[2][0].quality
+    worse = page.held.with_finger(1, page.touch.put(*page.touch.under(*beside(page, 1))))
+    page.change(worse)
+    start = page.touch.worth(worse, page.hand)
     wait(lambda: window.quality() == pytest.approx(start, abs=1e-4))
+    began = time.monotonic()
     window.page.get_by_role("button", name="Improve this grasp").click()
-    wait(lambda: window.quality() > 1.1 * start)
+    wait(lambda: window.quality() > start)
+    assert time.monotonic() - began < 3.0
+    window.page.get_by_role("button", name="Undo").click()
+    wait(lambda: window.quality() == pytest.approx(start, abs=1e-4))
+    window.page.get_by_role("button", name="Revert").click()
+    wait(lambda: window.quality() == pytest.approx(found[2][0].quality, abs=1e-4))
     window.page.close()
 
 
-def test_the_ascent_never_ends_lower_than_it_starts(served, browser, found):
+def beside(page, index):
+    """Where a finger is put a good way beside its contact."""
+    finger = page.held.fingers[index]
+    side = np.cross(finger.normal, [0.3, 0.5, 0.8])
+    start = finger.point - 2.0 * page.touch.size * finger.normal
+    return start, finger.point + 0.15 * page.touch.size * side
+
+
+def test_what_follows_friction(browser, served, found):
+    """Text, ranks, colours and their key."""
     address, pages = served
     window = ready(Window(browser, address))
-    page, fit = pages[-1], found[1]
-    for ranked in found[2]:
-        for friction in (0.3, 1.0):
-            page.friction.value = friction
-            grasp = fit.on_surface(ranked)
-            # As it was offered, on the mesh, and from the fitted surface.
-            for offered in (ranked, None):
-                page.show(grasp, offered)
-                start = page._worth(grasp, offered)
-                page.climb()
-                assert page._worth(page.grasp, page.offered) >= start
+    page = pages[-1]
+    page.colors.mode.value = "Q with finger 1 there"
+    wait(lambda: page.colors.discs is not None)
+    first = np.array(page.colors.discs.batched_colors)
+    key = page.colors.key.content
+    page.friction.value = 0.4
+    wanted = [gm.quality(one, friction=0.4) for one in found[2]]
+    cells = window.page.locator("[data-ranking] tbody tr td:nth-child(3)")
+    wait(
+        lambda: (
+            [cell == f"{q:.4f}" for cell, q in zip(cells.all_inner_texts(), wanted, strict=True)]
+            == [True] * 3
+        )
+    )
+    wait(lambda: page.colors.key.content != key)
+    values = page.touch.what_if(page.held, 0, page.hand)
+    assert f"{values.max():.3f}" in page.colors.key.content
+    assert not np.array_equal(page.colors.discs.batched_colors, first)
     window.page.close()
+
+
+def test_a_contact_that_no_finger_makes_is_marked(browser, served):
+    address, pages = served
+    window = ready(Window(browser, address))
+    page = pages[-1]
+    assert window.page.locator("[data-truth]").get_attribute("data-truth") == "good"
+    finger = page.held.fingers[0]
+    lifted = page.touch.judge(finger.point - 0.1 * page.touch.size * finger.normal, finger.normal)
+    page.change(page.held.with_finger(0, lifted))
+    wait(lambda: window.page.locator("[data-truth]").get_attribute("data-truth") == "bad")
+    assert "finger 1: it is off the object" in window.page.locator("[data-truth]").inner_text()
+    assert page.cages[0].visible
+    assert not page.cages[1].visible
+    window.page.close()
+
+
+def settled(page):
+    """The camera has come to rest."""
+
+    def still():
+        before = np.array(page.client.camera.position)
+        time.sleep(0.6)
+        return np.array_equal(before, page.client.camera.position)
+
+    wait(still)
+
+
+def drag(window, start, end):
+    mouse = window.page.mouse
+    mouse.move(*start)
+    mouse.down()
+    for share in np.linspace(0.0, 1.0, 9)[1:]:
+        mouse.move(*(np.array(start) + share * (np.array(end) - start)))
+        time.sleep(0.1)
+    mouse.up()
 
 
 @pytest.mark.parametrize(("friction", "edges"), [(0.05, 64), (0.77, 8), (3.3, 3)])
 def test_any_friction_and_edges_are_those_that_are_asked_for(browser, found, friction, edges):
     server = open_server(0)
-    pages = []
-
-    @server.on_client_connect
-    def _(client):
-        pages.append(GraspPage(client, *found, friction, edges, "bottle"))
+    pages = add_pages(server, shown_of(found, friction=friction, edges=edges))
 
     window = Window(browser, f"http://127.0.0.1:{server.get_port()}")
     window.page.wait_for_selector("[data-quality]", timeout=60_000)
@@ -301,6 +360,17 @@ def test_a_saved_page_opens_without_a_server(browser, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bottle.html", "bottle.png"]
     window = Window(browser, page.as_uri())
     wait(lambda: window.page.locator("canvas").count() > 0 and window.drawn() > 0.05)
+    assert window.page.title() == "yogurt_bottle.ply – graspmoduli"
+    # All grasps, by the slider; the sentence that explains Q, and a legend.
+    fit = gm.fit(OBJECT)
+    slider = window.page.get_by_role("slider")
+    for rank, grasp in enumerate(fit.synthesize(), 1):
+        slider.fill(str(rank))
+        assert window.quality() == pytest.approx(grasp.quality, abs=1e-4)
+        assert f"{rank} of 5" in window.page.locator("output").inner_text()
+    text = window.page.locator("aside").inner_text()
+    assert "is the largest disturbance" in text
+    assert "friction cone" in text
     assert window.errors == []
     assert window.outside == []
     window.page.close()
@@ -359,10 +429,10 @@ def test_barycentric_coordinates_stay_in_the_triangle():
     rng = np.random.default_rng(3)
     for weights in rng.dirichlet(np.ones(3), 20):
         np.testing.assert_allclose(
-            pointing.barycentric(weights @ pointing.TRIANGLE), weights, atol=1e-12
+            triangle.barycentric(weights @ triangle.TRIANGLE), weights, atol=1e-12
         )
     for point in 5.0 * rng.normal(size=(50, 3)) * [1, 0, 1]:
-        weights = pointing.barycentric(point)
+        weights = triangle.barycentric(point)
         assert (weights >= 0.0).all()
         assert weights.sum() == pytest.approx(1.0)
 

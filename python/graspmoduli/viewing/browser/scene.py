@@ -1,85 +1,45 @@
-"""What is drawn: objects, surfaces, fingers and their friction cones."""
+"""What is drawn: objects, surfaces, fingers and their friction cones, arrows, places in colours."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from ..._arrays import Floats
 from ...objects.fitting import Fit
 from ...objects.reading import Object
-from ...places import place_qualities
 from ...surfaces import Surface
-from ..drawing import BODY, FINGERS, NET, SEEN
+from ..drawing import BODY, NET, SEEN
+from ..forms import (
+    CONE,
+    DARK,
+    cone_mesh,
+    disc_mesh,
+    exits,
+    fewer,
+    finger_color,
+    local,
+    net_segments,
+    rgb,
+    turned_to,
+    twist_mesh,
+)
 
-#: Friction cones are drawn this long.
-CONE = 0.3
-
-
-def rgb(color: str) -> tuple[int, int, int]:
-    """Of ``"#rrggbb"``."""
-    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
-
-
-def surface_mesh(surface: Surface, rows: int = 48, columns: int = 72) -> tuple[Floats, Any]:
-    """Vertices (n, 3) and faces (k, 3) of a grid on a surface."""
-    u, theta = np.meshgrid(
-        np.linspace(0.0, 1.0, rows + 1), 2 * np.pi * np.arange(columns) / columns, indexing="ij"
-    )
-    vertices = surface.points(u, theta).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-    here, right = i * columns + j, i * columns + (j + 1) % columns
-    above, corner = here + columns, right + columns
-    faces = np.concatenate(
-        [np.stack([here, right, corner], -1), np.stack([here, corner, above], -1)]
-    )
-    return vertices, faces.reshape(-1, 3)
-
-
-def net_segments(surface: Surface) -> Floats:
-    """Lines of constant u and θ, a hair outside. Shape (n, 2, 3)."""
-    lines = []
-    around, upward = np.linspace(0.0, 2 * np.pi, 73), np.linspace(0.0, 1.0, 49)
-    for u in np.linspace(0.0, 1.0, 9):
-        lines.append((np.full_like(around, u), around))
-    for theta in np.linspace(0.0, 2 * np.pi, 17)[:-1]:
-        lines.append((upward, np.full_like(upward, theta)))
-    segments = []
-    for u, theta in lines:
-        points = surface.points(u, theta) - 0.003 * surface.normals(u, theta)
-        segments.append(np.stack([points[:-1], points[1:]], axis=1))
-    return np.concatenate(segments)
-
-
-def cone_mesh(point: Floats, normal: Floats, friction: float, edges: int) -> tuple[Floats, Any]:
-    """The friction cone on the finger's side, apex first."""
-    axis = -normal
-    side = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
-    other = np.cross(axis, side)
-    angles = 2 * np.pi * np.arange(edges) / edges
-    # Wide cones are cut shorter, so that all are of a size.
-    height = CONE / np.hypot(1.0, friction)
-    rim = point + height * (
-        axis + friction * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other)
-    )
-    k = np.arange(edges)
-    faces = np.stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % edges], axis=1)
-    return np.concatenate([point[None], rim]), faces
+#: A contact that no finger makes.
+BAD = (150, 0, 0)
 
 
 def draw_object(scene: Any, thing: Object, fit: Fit) -> Any:
     """The object itself, mesh or points, in the surface's coordinates."""
-    local = (thing.points - fit.pose[:3, 3]) @ fit.pose[:3, :3] / fit.length_scale
     if thing.faces is None:
-        shown = local[:: max(1, len(local) // 30_000)]
+        shown = local(fit, thing.points[:: max(1, len(thing.points) // 30_000)])
         return scene.add_point_cloud(
             "/object", shown, rgb(SEEN), point_size=0.012, point_shape="circle"
         )
+    vertices, faces = fewer(local(fit, thing.points), thing.faces)
     return scene.add_mesh_simple(
-        "/object", local, thing.faces, color=rgb(BODY), side="double", flat_shading=False
+        "/object", vertices, faces, color=rgb(BODY), side="double", flat_shading=False
     )
 
 
@@ -91,34 +51,91 @@ def draw_net(scene: Any, surface: Surface) -> Any:
 
 
 def draw_finger(
-    scene: Any, index: int, point: Floats, normal: Floats, friction: float, edges: int
-) -> None:
-    """Cone and normal of a contact."""
-    color = rgb(FINGERS[index % len(FINGERS)])
+    scene: Any, index: int, point: Floats, normal: Floats, friction: float, edges: int,
+    *, pad: float = 0.0, number: str = "", cones: bool = True,
+) -> None:  # fmt: skip
+    """Cone, normal and number of a contact; a soft one's pad."""
+    color = finger_color(index)
     vertices, faces = cone_mesh(point, normal, friction, edges)
     scene.add_mesh_simple(
-        f"/finger {index + 1}/cone", vertices, faces, color=color, opacity=0.45, side="double",
-        flat_shading=True, cast_shadow=False,
+        f"/finger {index + 1}/cone", vertices, faces, color=color, opacity=0.55, side="double",
+        flat_shading=True, cast_shadow=False, visible=cones,
     )  # fmt: skip
+    # The rim tells a cone from a white background.
+    rim = np.stack([vertices[1:], np.roll(vertices[1:], -1, axis=0)], axis=1)
+    scene.add_line_segments(
+        f"/finger {index + 1}/rim", rim, color, thickness=2.0, thickness_units="screen",
+        visible=cones,
+    )  # fmt: skip
+    tail = point - 1.2 * CONE * normal
     scene.add_arrows(
-        f"/finger {index + 1}/normal", np.stack([point - 1.2 * CONE * normal, point])[None], color,
+        f"/finger {index + 1}/normal", np.stack([tail, point])[None], color,
         shaft_radius=0.008, head_radius=0.025, head_length=0.06,
     )  # fmt: skip
+    if pad > 0.0:
+        vertices, faces = disc_mesh(pad, 24)
+        scene.add_mesh_simple(
+            f"/finger {index + 1}/pad", vertices, faces, color=color, side="double",
+            flat_shading=True, position=point - 0.012 * normal, wxyz=turned_to(normal[None])[0],
+        )  # fmt: skip
+    if number:
+        scene.add_label(
+            f"/finger {index + 1}/number", number, position=point - 1.45 * CONE * normal,
+            anchor="center-center", font_screen_scale=1.4,
+        )  # fmt: skip
 
 
-def place_colors(surface: Surface, friction: float, edges: int) -> Any:
-    """The surface coloured by how good the best grasp with a contact there is, as a mesh."""
-    from matplotlib import colormaps
+def draw_weakest(
+    scene: Any, center: Floats, push: Floats, twist: Floats, outline: Floats, *, shown: bool
+) -> list[Floats]:
+    """The push that a grasp resists least as an arrow from the centre of mass, the twist as a
+    curved one about its axis. Their points."""
+    force, torque = float(np.linalg.norm(push)), float(np.linalg.norm(twist))
+    push = push / force if force > 1e-9 else np.array([1.0, 0.0, 0.0])
+    axis = twist / torque if torque > 1e-9 else np.array([0.0, 0.0, 1.0])
+    # They come out of the object; what is hardly there has no arrow.
+    tip = center + (exits(center, push, outline) + 0.3) * push
+    is_push, is_twist = shown and force > 0.15, shown and torque > 0.15
+    scene.add_arrows(
+        "/weakest push", np.stack([center, tip])[None], DARK,
+        shaft_radius=0.012, head_radius=0.035, head_length=0.08, visible=is_push,
+    )  # fmt: skip
+    scene.add_label(
+        "/weakest push/label", "weakest push", position=tip + 0.07 * push,
+        anchor="center-center", visible=is_push,
+    )  # fmt: skip
+    end = center + (exits(center, axis, outline) + 0.12) * axis
+    vertices, faces, point = twist_mesh(end, axis, 0.2)
+    scene.add_mesh_simple(
+        "/weakest twist", vertices, faces, color=DARK, side="double", visible=is_twist,
+        cast_shadow=False,
+    )  # fmt: skip
+    scene.add_line_segments(
+        "/weakest twist/axis", np.stack([center, end + 0.1 * axis])[None], DARK, thickness=1.5,
+        thickness_units="screen", visible=is_twist,
+    )  # fmt: skip
+    scene.add_label(
+        "/weakest twist/label", "weakest twist", position=point + 0.09 * axis,
+        anchor="center-center", visible=is_twist,
+    )  # fmt: skip
+    points = [tip[None] + 0.1 * push] if is_push else []
+    return [*points, vertices] if is_twist else points
 
-    u, theta, best = place_qualities(surface, friction, edges)
-    vertices, faces = surface_mesh(surface)
-    apart = np.linalg.norm(vertices[:, None] - surface.points(u, theta), axis=2)
-    weights = 1.0 / (apart + 0.02) ** 4
-    values = (weights @ best) / weights.sum(axis=1)
-    low, high = float(best.min()), float(best.max())
-    colors = colormaps["cividis"]((values - low) / max(high - low, 1e-12))
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=(255 * colors).astype(np.uint8))
-    return mesh, low, high
+
+def draw_places(scene: Any, contacts: Floats, normals: Floats) -> Any:
+    """A disc at each of many places, to be coloured; not shown yet."""
+    from scipy.spatial import KDTree
+
+    distances: Any = KDTree(contacts).query(contacts, k=min(5, len(contacts)))[0]
+    radius = 0.95 * float(np.median(distances[:, -1]))
+    vertices, faces = disc_mesh(radius, 8)
+    # Each at a height of its own: discs in one plane would flicker.
+    lift = 0.004 + 0.006 * ((np.arange(len(contacts)) * 0.618034) % 1.0)
+    return scene.add_batched_meshes_simple(
+        "/places", vertices, faces, turned_to(normals), contacts - lift[:, None] * normals,
+        batched_colors=np.full((len(contacts), 3), 200, dtype=np.uint8), side="double", lod="off",
+        cast_shadow=False, receive_shadow=False, visible=False, flat_shading=True,
+    )  # fmt: skip
 
 
 def look(client: Any, at: float, far: float, azimuth: float) -> None:

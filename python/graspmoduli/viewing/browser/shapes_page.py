@@ -16,8 +16,9 @@ from ...surfaces import Surface, combine
 from ...synthesis import synthesize
 from ...transfers import transfer
 from ..drawing import FILLED, NET
-from .pointing import TRIANGLE, barycentric
-from .scene import draw_finger, look, net_segments, rgb, surface_mesh
+from ..forms import net_segments, rgb, surface_mesh
+from .scene import draw_finger, look
+from .triangle import TRIANGLE, barycentric
 
 #: From the middle of a path's surfaces to the corner: how finely a path is drawn.
 PATH = 40
@@ -27,8 +28,11 @@ WAYS = ("naive", "gradient", "ascent")
 class ShapePage:
     """Three shapes as the corners of a triangle, and a grasp carried through it."""
 
-    def __init__(self, client: Any, own: dict[str, Surface]) -> None:
+    def __init__(
+        self, client: Any, own: dict[str, Surface], friction: float = 1.0, edges: int = 8
+    ) -> None:
         self.client = client
+        self.hand = {"friction": friction, "edges": edges}
         self.shapes = {f"{key}: {NAMES[key]}": surface for key, surface in MODELS.items()}
         self.shapes |= own
         names = list(self.shapes)
@@ -95,13 +99,15 @@ class ShapePage:
         """With other corners."""
         with self.lock:
             self.ends = [self.shapes[corner.value] for corner in self.corners]
-            found = synthesize(self.ends[0], top=1)
+            found = synthesize(self.ends[0], top=1, **self.hand)
             self.grasp = found[0].grasp if found else Grasp([0.5] * 3, [0.0, 2.1, 4.2])
             self.show()
 
     def _carried(self, target: Surface, method: str) -> Any:
         finer = {"steps": 10, "step_length": 2e-3} if method == "gradient" else {}
-        return transfer(self.ends[0], self.grasp, target, method, surfaces=PATH, **finer)
+        return transfer(
+            self.ends[0], self.grasp, target, method, surfaces=PATH, **self.hand, **finer
+        )
 
     def show(self) -> None:
         """The shape at the point, the grasp on it, and its quality on the way there and beyond."""
@@ -117,7 +123,7 @@ class ShapePage:
             if t > 1e-9:
                 here = combine([self.ends[0], far], [1.0 - t, t])
                 carried = self._carried(here, method).grasp
-            value = quality(place(here, carried))
+            value = quality(place(here, carried), **self.hand)
             marks = np.full(len(path.t), np.nan)
             nearest = int(np.abs(path.t - t).argmin())
             marks[nearest] = value
@@ -132,7 +138,11 @@ class ShapePage:
             placed = place(here, carried)
             for index in range(3):
                 draw_finger(
-                    self.client.scene, index, placed.contacts[index], placed.normals[index], 1.0, 8
+                    self.client.scene,
+                    index,
+                    placed.contacts[index],
+                    placed.normals[index],
+                    **self.hand,
                 )
             self.ball.position = w @ TRIANGLE
             state = "force closure" if value > 0.0 else "lost"

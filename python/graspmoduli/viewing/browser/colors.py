@@ -1,0 +1,135 @@
+"""The object in colours: what a finger would be worth elsewhere, where a tip may press, parts."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_rgb
+
+from ..._arrays import Floats
+from ..._core import GraspModuliError
+from .. import words
+from ..forms import local
+from ..plotting import LINES
+from .scene import draw_places
+
+if TYPE_CHECKING:
+    from .grasp_page import GraspPage
+
+NOTHING, MAY, PARTS = "nothing", "where a fingertip may press", "parts"
+#: What is worse than the bar, and what belongs to no part.
+GREY = (150, 150, 150)
+
+
+class Colors:
+    """Discs all over the object."""
+
+    def __init__(self, page: GraspPage) -> None:
+        self.page = page
+        gui = page.client.gui
+        count = len(page.held.fingers)
+        self.moved = {f"Q with finger {k + 1} there": k for k in range(count)}
+        ways = [NOTHING, *self.moved, MAY]
+        if page.fit.mesh is not None:
+            ways.append(PARTS)
+        self.mode = gui.add_dropdown("colour by", ways, initial_value=NOTHING)
+        self.live = gui.add_checkbox("colour while dragging", True)
+        self.bar = gui.add_slider("grey below, of the best", 0.0, 1.0, 0.05, 0.0)
+        self.key = gui.add_html("")
+        self.discs: Any = None
+        self.parts: Any = None
+        self.dragged: int | None = None
+        self.mode.on_update(lambda _: self.refresh())
+        self.bar.on_update(lambda _: self.refresh())
+
+    def drag(self, index: int) -> None:
+        """A finger is taken."""
+        if self.live.value:
+            self.dragged = index
+            self.refresh()
+
+    def drop(self) -> None:
+        """It is let go."""
+        self.dragged = None
+        self.refresh()
+
+    def refresh(self) -> None:
+        """The colours as they should be now."""
+        with self.page.lock:
+            mode = str(self.mode.value)
+            index = self.moved.get(mode) if self.dragged is None else self.dragged
+            if index is None and mode == NOTHING:
+                self.key.content = ""
+                if self.discs is not None:
+                    self.discs.visible = False
+                return
+            touch = self.page.touch
+            if not len(touch.places.contacts):
+                self.key.content = words.block("No fingertip may press anywhere on this object.")
+                return
+            if index is not None:
+                values = touch.what_if(self.page.held, index, self.page.hand)
+                self._paint(values, f"Q if finger {index + 1} were there and the others stayed")
+            elif mode == MAY:
+                mesh = self.page.fit.mesh is not None
+                what = (
+                    "Share of the pad that bears, where a fingertip may press" if mesh
+                    else "1 where a straight finger meets what was seen"
+                )  # fmt: skip
+                self._paint(touch.places.bearing, what, whole=True)
+            else:
+                self._paint_parts()
+
+    def _paint(self, values: Floats, what: str, *, whole: bool = False) -> None:
+        high = 1.0 if whole else float(values.max())
+        bar = float(self.bar.value) * high
+        colors = colormaps["cividis"](values / max(high, 1e-12))[:, :3]
+        shades = (255 * colors).astype(np.uint8)
+        shades[values < bar] = GREY
+        self._draw(shades)
+        self.key.content = words.colors(0.0, high, what, bar if bar > 0.0 else None)
+
+    def _draw(self, shades: Any) -> None:
+        if self.discs is None:
+            places, fit = self.page.touch.places, self.page.fit
+            normals = places.normals @ fit.pose[:3, :3]
+            scene = self.page.client.scene
+            self.discs = draw_places(scene, local(fit, places.contacts), normals)
+        self.discs.batched_colors = shades
+        self.discs.visible = True
+
+    def _paint_parts(self) -> None:
+        if self.parts is None:
+            self.key.content = words.block("Finding the parts …")
+            threading.Thread(target=self._find_parts, daemon=True).start()
+            return
+        if isinstance(self.parts, str):
+            self.key.content = words.block(self.parts)
+            return
+        owner = self.parts.part_of(self.page.touch.places.contacts)
+        colors = np.array([to_rgb(color) for color, _ in LINES[:-1]])
+        shades = (255 * colors[owner % len(colors)]).astype(np.uint8)
+        shades[owner < 0] = GREY
+        self._draw(shades)
+        items = "".join(
+            f"<li><span class='gm-dot' style='background:{LINES[k % 5][0]}'></span>"
+            f"part {k + 1}: {share:.0%} of what is visible</li>"
+            for k, share in enumerate(self.parts.shares)
+        )
+        self.key.content = words.block(f"<ul class='gm-legend' data-parts>{items}</ul>")
+
+    def _find_parts(self) -> None:
+        from ...objects.parts import fit_parts
+
+        thing = self.page.shown.thing
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                self.parts = fit_parts((thing.points, thing.faces))
+        except GraspModuliError as error:
+            self.parts = str(error)
+        self.refresh()
