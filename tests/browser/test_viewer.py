@@ -15,6 +15,7 @@ from playwright.sync_api import sync_playwright
 
 import graspmoduli as gm
 from conftest import ROOT
+from graspmoduli.cli.given import grasps_of, read_report
 from graspmoduli.cli.report import report
 from graspmoduli.objects.fitting import fit_object
 from graspmoduli.objects.reading import read
@@ -80,9 +81,9 @@ def served(found):
 class Window:
     """A page with what went wrong on it."""
 
-    def __init__(self, browser, address, width=1280):
+    def __init__(self, browser, address, width=1280, height=800):
         self.errors, self.outside = [], []
-        self.page = browser.new_page(viewport={"width": width, "height": 800})
+        self.page = browser.new_page(viewport={"width": width, "height": height})
         self.page.on("console", lambda m: m.type == "error" and self.errors.append(m.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", self._request)
@@ -257,8 +258,8 @@ def test_what_follows_friction(browser, served, found):
     window = ready(Window(browser, address))
     page = pages[-1]
     page.colors.mode.value = "Q with finger 1 there"
-    wait(lambda: page.colors.discs is not None)
-    first = np.array(page.colors.discs.batched_colors)
+    wait(lambda: page.colors.on)
+    first = page.colors.drawn
     key = page.colors.key.content
     page.friction.value = 0.4
     wanted = [gm.quality(one, friction=0.4) for one in found[2]]
@@ -272,7 +273,7 @@ def test_what_follows_friction(browser, served, found):
     wait(lambda: page.colors.key.content != key)
     values = page.touch.what_if(page.held, 0, page.hand)
     assert f"{values.max():.3f}" in page.colors.key.content
-    assert not np.array_equal(page.colors.discs.batched_colors, first)
+    wait(lambda: page.colors.drawn is not first)
     window.page.close()
 
 
@@ -288,6 +289,106 @@ def test_a_contact_that_no_finger_makes_is_marked(browser, served):
     assert "finger 1: it is off the object" in window.page.locator("[data-truth]").inner_text()
     assert page.cages[0].visible
     assert not page.cages[1].visible
+    window.page.close()
+
+
+def test_a_key_moves_a_finger(browser, served):
+    address, pages = served
+    window = ready(Window(browser, address))
+    page = pages[-1]
+    settled(page)
+    before = page.held
+    window.page.keyboard.press("2")
+    wait(lambda: page.chosen == 1)
+    window.page.keyboard.press("i")
+    wait(lambda: not np.array_equal(page.held.contacts[1], before.contacts[1]))
+    moved = page.held.contacts
+    np.testing.assert_array_equal(moved[[0, 2]], before.contacts[[0, 2]])
+    assert 0.0 < np.linalg.norm(moved[1] - before.contacts[1]) < 0.05 * page.touch.size
+    window.page.keyboard.press("u")
+    wait(lambda: np.array_equal(page.held.contacts, before.contacts))
+    window.page.close()
+
+
+def test_what_is_saved_is_read_back(browser, served, tmp_path):
+    address, pages = served
+    window = ready(Window(browser, address))
+    page = pages[-1]
+    page.change(page.held.with_finger(1, page.touch.put(*page.touch.under(*beside(page, 1)))))
+    window.page.get_by_role("tab", name="Save").click()
+    cells = window.page.locator("[data-contacts] tbody tr").nth(1).inner_text().split()
+    shown = page.held.contacts[1]
+    np.testing.assert_allclose([float(cell) for cell in cells[-3:]], shown, atol=0.01)
+    with window.page.expect_download() as waiting:
+        window.page.get_by_role("button", name="Save JSON").click()
+    path = tmp_path / "saved.json"
+    waiting.value.save_as(path)
+    found = read_report(path)
+    again = grasps_of(found, path, page.fit, page.hand)
+    np.testing.assert_array_equal(again[0].contacts, page.held.contacts)
+    assert again[0].quality == page.touch.worth(page.held, page.hand)
+    assert len(again) == 4
+    with window.page.expect_download() as waiting:
+        window.page.get_by_role("button", name="Save PNG").click()
+    picture = tmp_path / "saved.png"
+    waiting.value.save_as(picture)
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    assert (np.abs(pixels - 255).max(-1) > 20).mean() > 0.03
+    window.page.close()
+
+
+def test_a_pull_is_answered_until_the_object_slips(browser, served):
+    address, pages = served
+    window = ready(Window(browser, address))
+    page = pages[-1]
+    window.page.get_by_role("tab", name="Pull").click()
+    page.pull.shown.value = True
+    page.pull.squeeze.value = 100.0
+    verdict = window.page.locator("[data-pull]")
+    wait(lambda: "It holds" in verdict.inner_text())
+    page.pull.payload.value = 5.0
+    page.pull.squeeze.value = 1.0
+    wait(lambda: "It slips" in verdict.inner_text())
+    window.page.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
+def test_the_first_look_shows_all_fingers(browser, served, width, height):
+    """Within the picture, not under the panel, and Q above it."""
+    address, pages = served
+    window = Window(browser, address, width, height)
+    ready(window)
+    page = pages[-1]
+    settled(page)
+    sheet = 0.42 * height if width < 576 else 0.0
+    box, _ = window.canvas()
+    for rank in (1, 2, 3):
+        page.rank.value = rank
+        settled(page)
+        for ball in page.balls:
+            x, y = on_screen(page, window, ball.position)
+            assert 0.0 < x < box["width"]
+            assert 0.0 < y < height - sheet
+    state = window.page.locator("#gm-state")
+    assert f"{window.quality():.4f}" in state.inner_text()
+    assert "true on the object" in state.inner_text()
+    window.page.close()
+
+
+def test_every_control_has_a_name_and_the_page_a_title(browser, served):
+    address, _ = served
+    window = ready(Window(browser, address))
+    assert window.page.title() == "bottle.ply – graspmoduli"
+    for tab in ("Grasp", "See", "Pull", "Save"):
+        window.page.get_by_role("tab", name=tab).click()
+        time.sleep(0.5)
+        nameless = window.page.evaluate(
+            """() => [...document.querySelectorAll("input, [role=slider], button")]
+                .filter((e) => e.offsetParent && !e.getAttribute("aria-label")
+                    && !e.getAttribute("aria-labelledby") && !e.innerText.trim()
+                    && !(e.labels && e.labels.length)).map((e) => e.outerHTML)"""
+        )
+        assert nameless == []
     window.page.close()
 
 

@@ -125,6 +125,12 @@ def exits(center: Floats, way: Floats, outline: Floats) -> float:
     return float(near.max()) if len(near) else 0.3
 
 
+def twist_end(center: Floats, axis: Floats, outline: Floats, towards: Floats) -> Floats:
+    """Where a twist is drawn on its axis: outside of the object, at the end nearer to the eye."""
+    way = axis if axis @ towards >= 0.0 else -axis
+    return center + (exits(center, way, outline) + 0.12) * way
+
+
 def turned_to(normals: Floats) -> Floats:
     """Quaternions (n, 4) that turn the third axis to directions."""
     z = -normals

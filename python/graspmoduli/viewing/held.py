@@ -27,9 +27,9 @@ from ..sampling import sample_points
 from .pointing import under_pointer
 
 #: Places on the object at which it is asked what a finger would be worth there.
-PLACES = 3_000
-#: Less of a pad on the object than this, and the contact is on an edge.
-EDGE = 0.4
+PLACES = 4_000
+#: If more than this share of what lies under a pad is turned from what it feels, it is on an edge.
+EDGE = 0.6
 #: A contact farther than this from the object, over its size, is off it.
 OFF = 5e-3
 #: With the triangles' own normals this share of the quality must be left, as for grasps on offer.
@@ -104,12 +104,14 @@ class Held:
 
 
 class Places(NamedTuple):
-    """Where fingers may press on an object. Shapes (n, 3), (n, 3), (n,)."""
+    """Where fingers may press on an object. Shapes (n, 3), (n, 3), (n,), (n,)."""
 
     contacts: Floats
     normals: Floats
     #: Share of the pad that bears; of a cloud 1 where a finger must meet what was seen, else 0.
     bearing: Floats
+    #: Share of what lies under the pad that is turned as it feels. Shape (n,).
+    flatness: Floats
 
 
 class Touch:
@@ -197,8 +199,8 @@ class Touch:
         elif exact @ way[0] < math.cos(math.radians(30.0)):
             turned = math.degrees(math.acos(float(exact @ way[0])))
             why = f"it is on an edge: the triangle there is turned by {turned:.0f}°"
-        elif bearing < EDGE:
-            why = f"it is on an edge: only {bearing:.0%} of the pad bears"
+        elif float(pressed[10]) > EDGE:
+            why = f"it is on an edge: {pressed[10]:.0%} of what lies under the pad is turned away"
         check = ContactCheck(
             distance=away * self.size,
             angle=math.acos(max(-1.0, min(1.0, float(exact @ way[0])))),
@@ -327,8 +329,8 @@ class Touch:
         if self.fit.mesh is not None:
             mesh = self.fit.mesh
             rows = places_of(mesh, self.share, 0, PLACES)
-            bearing = rows[:, 7].copy()
-            return Places(mesh.back(rows[:, :3]), np.ascontiguousarray(rows[:, 3:6]), bearing)
+            normals = np.ascontiguousarray(rows[:, 3:6])
+            return Places(mesh.back(rows[:, :3]), normals, rows[:, 7].copy(), 1.0 - rows[:, 6])
         u, theta = sample_points(self.fit.surface, PLACES, seed=0)
         allowed = self._is_allowed(u, theta)
         u, theta = u[allowed], theta[allowed]
@@ -344,6 +346,7 @@ class Touch:
             self.fit.to_object(self.fit.surface.points(u, theta)),
             self.fit.directions_to_object(self.fit.surface.normals(u, theta)),
             bearing,
+            np.ones(len(u)),
         )
 
     def what_if(self, held: Held, index: int, hand: Hand, some: Any = slice(None)) -> Floats:

@@ -97,7 +97,7 @@ def _at(touch: Touch, place: int) -> Contact:
 def _good(touch: Touch) -> Any:
     """Places that a grasp can be true at, a third of all: what is found is climbed from."""
     some = np.arange(len(touch.places.contacts))
-    return (some if touch.fit.mesh is None else some[touch.places.bearing > EDGE])[::3]
+    return some[touch.places.flatness >= 1.0 - EDGE][::3]
 
 
 def _one_moved(touch: Touch, held: Held, hand: Hand) -> Held | None:

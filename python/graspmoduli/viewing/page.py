@@ -30,6 +30,7 @@ from .forms import (
     local,
     net_segments,
     rgb,
+    twist_end,
     twist_mesh,
 )
 from .held import Hand, Held, Touch
@@ -151,8 +152,8 @@ def _drawn(grasp: ObjectGrasp, touch: Touch, hand: Hand, outline: Floats) -> dic
         mark = " ✗" if finger.why else "" if finger.check.seen else " ?"
         place = (point - 1.4 * CONE * normal).tolist()
         labels.append((f"{k + 1}{mark}", place, FINGERS[k % len(FINGERS)]))
-    arrows = _weakest(solid, labels, held, touch, hand, outline)
     way, _ = best_direction(points, normals, outline, in_the_way(fit))
+    arrows = _weakest(solid, labels, held, touch, hand, outline, way)
     value = touch.worth(held, hand)
     shown = [*points, *(points - 1.5 * CONE * normals), *arrows]
     solids, glasses = solid.coded(), glass.coded()
@@ -170,8 +171,14 @@ def _drawn(grasp: ObjectGrasp, touch: Touch, hand: Hand, outline: Floats) -> dic
 
 
 def _weakest(
-    soup: _Soup, labels: list[Any], held: Held, touch: Touch, hand: Hand, outline: Floats
-) -> list[Floats]:
+    soup: _Soup,
+    labels: list[Any],
+    held: Held,
+    touch: Touch,
+    hand: Hand,
+    outline: Floats,
+    towards: Floats,
+) -> list[Floats]:  # fmt: skip
     """The weakest push and twist, and their ends."""
     turn, center = touch.fit.pose[:3, :3], local(touch.fit, touch.center)
     push, twist = (one @ turn for one in touch.weakest(held, hand))
@@ -184,10 +191,14 @@ def _weakest(
         ends.append(tip)
     if torque > 0.15:
         axis = twist / torque
-        end = center + (exits(center, axis, outline) + 0.12) * axis
+        end = twist_end(center, axis, outline, towards)
         vertices, faces, point = twist_mesh(end, axis, 0.2)
         soup.add(vertices, faces, DARK, 255)
-        soup.add(*_rod(center, end + 0.1 * axis, (0.004, 0.004)), DARK, 255)
+        soup.add(
+            *_rod(center, end + 0.1 * axis * np.sign(axis @ (end - center)), (0.004, 0.004)),
+            DARK,
+            255,
+        )
         labels.append(("weakest twist", (point + 0.09 * axis).tolist(), ""))
         ends += [end, point]
     return ends

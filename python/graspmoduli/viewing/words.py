@@ -12,6 +12,8 @@ from .held import Hand, Held
 
 #: Good news and bad, readable on white and on dark.
 GOOD, BAD = "good", "bad"
+#: Share of a pad that is little to bear.
+LITTLE = 0.4
 
 
 def block(text: str, style: str = "") -> str:
@@ -28,6 +30,9 @@ def truth(fit: Fit, held: Held, untrue: str) -> tuple[str, str]:
         if held.held is not None:
             share = "All" if held.held >= 1.0 else f"{held.held:.0%}"
             text += f" {share} of the errors of aim that were tried leave force closure."
+        least = min(finger.check.bearing for finger in held.fingers)
+        if least < LITTLE:
+            text += f" But as little as {least:.0%} of a pad bears: it is thin there."
         return GOOD, text
     if held.unseen:
         names = " and ".join(str(k) for k in held.unseen)

@@ -30,6 +30,8 @@ class Eye:
         some = thing.samples[:: max(1, len(thing.samples) // 1500)]
         self.outline = local(fit, some)
         self.moves = 0
+        #: Towards the eye, in the best view.
+        self.way = np.array([1.0, 0.0, 0.0])
 
     def view(
         self, contacts: Floats, normals: Floats, others: list[Floats], aspect: float, fov: float
@@ -50,6 +52,7 @@ class Eye:
         camera = self.client.camera
         eye, target, seen = self.view(contacts, normals, others, camera.aspect, camera.fov)
         self.moves += 1
+        self.way = (eye - target) / np.linalg.norm(eye - target)
         if ease:
             threading.Thread(target=self._ease, args=(eye, target, self.moves), daemon=True).start()
         else:

@@ -7,15 +7,17 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 
 from ..._arrays import Floats
 from ..._core import GraspModuliError
+from ...objects.fitting import Fit
 from .. import words
-from ..forms import local
+from ..forms import fewer, local, surface_mesh
+from ..held import Places
 from ..plotting import LINES
-from .scene import draw_places
 
 if TYPE_CHECKING:
     from .grasp_page import GraspPage
@@ -23,10 +25,62 @@ if TYPE_CHECKING:
 NOTHING, MAY, PARTS = "nothing", "where a fingertip may press", "parts"
 #: What is worse than the bar, and what belongs to no part.
 GREY = (150, 150, 150)
+#: Where no fingertip may press.
+NOWHERE = (217, 207, 193)
+
+
+#: What is painted: about so many triangles, with edges of at most so much of the radius.
+FACES, EDGE = 24_000, 0.07
+#: Farther from all places than this, over the object's radius, no fingertip may press.
+FAR = 0.09
+#: What a turned normal counts as distance: the two sides of a wall are different places.
+TURNED = 0.15
+
+
+class Skin:
+    """An object's triangles, small ones, and the places near their vertices."""
+
+    def __init__(self, fit: Fit, places: Places) -> None:
+        from scipy.spatial import KDTree
+
+        if fit.mesh is None:
+            vertices, faces = surface_mesh((1.0 / fit.length_scale) * fit.surface)
+        else:
+            vertices, faces = fewer(local(fit, fit.mesh.vertices), fit.mesh.faces, FACES)
+            if len(faces) < FACES // 2:
+                vertices, faces = trimesh.remesh.subdivide_to_size(vertices, faces, EDGE, 12)
+        self.mesh = trimesh.Trimesh(vertices, faces, process=False)
+        points = np.asarray(self.mesh.vertices)
+        outward = np.asarray(self.mesh.vertex_normals)
+        tree = KDTree(
+            np.hstack([local(fit, places.contacts), TURNED * places.normals @ fit.pose[:3, :3]])
+        )
+        count = min(4, len(places.contacts))
+        # The winding of a mesh is not to be trusted: the side that is nearer is meant.
+        found: Any = [
+            tree.query(np.hstack([points, sign * TURNED * outward]), k=[*range(1, count + 1)])
+            for sign in (-1.0, 1.0)
+        ]
+        nearer = (found[1][0][:, 0] < found[0][0][:, 0])[:, None]
+        away = np.where(nearer, found[1][0], found[0][0])
+        self.places = np.where(nearer, found[1][1], found[0][1])
+        weights = 1.0 / (away + 0.01) ** 2
+        self.weights = weights / weights.sum(axis=1, keepdims=True)
+        self.none = away[:, 0] > FAR
+
+    def painted(self, shades: Any) -> Any:
+        """The mesh, with a colour (RGB, 0 to 255) for each of the places."""
+        colors = (self.weights[:, :, None] * shades[self.places]).sum(axis=1)
+        colors[self.none] = NOWHERE
+        mesh = trimesh.Trimesh(self.mesh.vertices, self.mesh.faces, process=False)
+        mesh.visual.vertex_colors = np.hstack(  # type: ignore[union-attr]
+            [colors.astype(np.uint8), np.full((len(colors), 1), 255, dtype=np.uint8)]
+        )
+        return mesh
 
 
 class Colors:
-    """Discs all over the object."""
+    """The object in colours."""
 
     def __init__(self, page: GraspPage) -> None:
         self.page = page
@@ -40,11 +94,17 @@ class Colors:
         self.live = gui.add_checkbox("colour while dragging", True)
         self.bar = gui.add_slider("grey below, of the best", 0.0, 1.0, 0.05, 0.0)
         self.key = gui.add_html("")
-        self.discs: Any = None
+        self.skin: Skin | None = None
+        self.drawn: Any = None
         self.parts: Any = None
         self.dragged: int | None = None
         self.mode.on_update(lambda _: self.refresh())
         self.bar.on_update(lambda _: self.refresh())
+
+    @property
+    def on(self) -> bool:
+        """Is the object painted?"""
+        return self.drawn is not None and bool(self.drawn.visible)
 
     def drag(self, index: int) -> None:
         """A finger is taken."""
@@ -64,8 +124,9 @@ class Colors:
             index = self.moved.get(mode) if self.dragged is None else self.dragged
             if index is None and mode == NOTHING:
                 self.key.content = ""
-                if self.discs is not None:
-                    self.discs.visible = False
+                if self.drawn is not None:
+                    self.drawn.visible = False
+                    self.page.object.visible = bool(self.page.object_shown.value)
                 return
             touch = self.page.touch
             if not len(touch.places.contacts):
@@ -94,13 +155,12 @@ class Colors:
         self.key.content = words.colors(0.0, high, what, bar if bar > 0.0 else None)
 
     def _draw(self, shades: Any) -> None:
-        if self.discs is None:
-            places, fit = self.page.touch.places, self.page.fit
-            normals = places.normals @ fit.pose[:3, :3]
-            scene = self.page.client.scene
-            self.discs = draw_places(scene, local(fit, places.contacts), normals)
-        self.discs.batched_colors = shades
-        self.discs.visible = True
+        """The object's vertices in the colours of the places around them."""
+        if self.skin is None:
+            self.skin = Skin(self.page.fit, self.page.touch.places)
+        mesh = self.skin.painted(shades)
+        self.drawn = self.page.client.scene.add_mesh_trimesh("/places", mesh)
+        self.page.object.visible = False
 
     def _paint_parts(self) -> None:
         if self.parts is None:

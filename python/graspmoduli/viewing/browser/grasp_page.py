@@ -178,7 +178,7 @@ class GraspPage:
         self.edges = gui.add_slider("cone edges l", EDGES[0], max(EDGES[1], edges), 1, edges)
 
     def _visible(self) -> None:
-        self.object.visible = bool(self.object_shown.value)
+        self.object.visible = bool(self.object_shown.value) and not self.colors.on
         self.net.visible = bool(self.net_shown.value)
 
     def _keys(self) -> None:
@@ -315,6 +315,7 @@ class GraspPage:
         contacts = local(self.fit, self.held.contacts)
         normals = self.held.normals @ self.fit.pose[:3, :3]
         seen = self.eye.home(contacts, normals, self.arrows, ease=ease)
+        self._weakest()
         if self.shown.thing.faces is not None:
             self.object.opacity = None if seen.all() else 0.55
 
@@ -360,14 +361,18 @@ class GraspPage:
                     scene, index, points[index], normals[index], hand.friction, hand.edges,
                     pad=pad, number=number, cones=bool(self.cones_shown.value),
                 )  # fmt: skip
-            push, twist = self.touch.weakest(held, hand)
-            center = local(self.fit, self.touch.center)
-            shown = bool(self.weakest_shown.value) and not self.pull.on
-            self.arrows = draw_weakest(
-                scene, center, push @ turn, twist @ turn, self.eye.outline, shown=shown
-            )
+            self._weakest()
             self._write(held, hand)
             self.pull.show()
+
+    def _weakest(self) -> None:
+        """The arrows of what is resisted least."""
+        turn, center = self.fit.pose[:3, :3], local(self.fit, self.touch.center)
+        push, twist = (one @ turn for one in self.touch.weakest(self.held, self.hand))
+        shown = bool(self.weakest_shown.value) and not self.pull.on
+        self.arrows = draw_weakest(
+            self.client.scene, center, push, twist, self.eye.outline, self.eye.way, shown=shown
+        )
 
     def _write(self, held: Held, hand: Hand) -> None:
         value = self.touch.worth(held, hand)

@@ -9,6 +9,7 @@ import numpy as np
 from ...wrench_space import WrenchSpace
 from .. import words
 from ..forms import finger_color, local
+from .scene import draw_label
 
 if TYPE_CHECKING:
     from .grasp_page import GraspPage
@@ -95,10 +96,13 @@ class Pull:
                 finger_color(index), shaft_radius=0.02, head_radius=0.05, head_length=0.09,
                 visible=seen,
             )  # fmt: skip
-            scene.add_label(
-                f"/finger {index + 1}/newtons", f"{size:.1f} N", position=point - 1.1 * along,
-                anchor="center-center", visible=seen,
-            )  # fmt: skip
+            draw_label(
+                scene,
+                f"/words/force {index + 1}",
+                f"{size:.1f} N",
+                point - 1.1 * along,
+                visible=seen,
+            )
         if not self.on:
             self.text.content = ""
             return

@@ -23,6 +23,7 @@ from ..forms import (
     net_segments,
     rgb,
     turned_to,
+    twist_end,
     twist_mesh,
 )
 
@@ -79,14 +80,36 @@ def draw_finger(
             flat_shading=True, position=point - 0.012 * normal, wxyz=turned_to(normal[None])[0],
         )  # fmt: skip
     if number:
+        draw_label(
+            scene, f"/words/finger {index + 1}", number, point - 1.45 * CONE * normal, scale=1.4
+        )
+
+
+def draw_label(
+    scene: Any, name: str, text: str, place: Floats, *, visible: bool = True, scale: float = 1.0
+) -> None:
+    """Words at a place; a label that is there is moved, since a new one takes a while to appear."""
+    label = scene.get_handle_by_name(name)
+    if label is None:
         scene.add_label(
-            f"/finger {index + 1}/number", number, position=point - 1.45 * CONE * normal,
-            anchor="center-center", font_screen_scale=1.4,
+            name, text, position=place, anchor="center-center", font_screen_scale=scale,
+            visible=visible,
         )  # fmt: skip
+        return
+    label.position, label.visible = place, visible
+    if label.text != text:
+        label.text = text
 
 
 def draw_weakest(
-    scene: Any, center: Floats, push: Floats, twist: Floats, outline: Floats, *, shown: bool
+    scene: Any,
+    center: Floats,
+    push: Floats,
+    twist: Floats,
+    outline: Floats,
+    towards: Floats,
+    *,
+    shown: bool,
 ) -> list[Floats]:
     """The push that a grasp resists least as an arrow from the centre of mass, the twist as a
     curved one about its axis. Their points."""
@@ -100,42 +123,23 @@ def draw_weakest(
         "/weakest push", np.stack([center, tip])[None], DARK,
         shaft_radius=0.012, head_radius=0.035, head_length=0.08, visible=is_push,
     )  # fmt: skip
-    scene.add_label(
-        "/weakest push/label", "weakest push", position=tip + 0.07 * push,
-        anchor="center-center", visible=is_push,
-    )  # fmt: skip
-    end = center + (exits(center, axis, outline) + 0.12) * axis
+    draw_label(scene, "/words/weakest push", "weakest push", tip + 0.07 * push, visible=is_push)
+    end = twist_end(center, axis, outline, towards)
+    beyond = end + 0.1 * axis * np.sign(axis @ (end - center))
     vertices, faces, point = twist_mesh(end, axis, 0.2)
     scene.add_mesh_simple(
         "/weakest twist", vertices, faces, color=DARK, side="double", visible=is_twist,
         cast_shadow=False,
     )  # fmt: skip
     scene.add_line_segments(
-        "/weakest twist/axis", np.stack([center, end + 0.1 * axis])[None], DARK, thickness=1.5,
-        thickness_units="screen", visible=is_twist,
+        "/weakest twist/axis", np.stack([center, beyond])[None],
+        DARK, thickness=1.5, thickness_units="screen", visible=is_twist,
     )  # fmt: skip
-    scene.add_label(
-        "/weakest twist/label", "weakest twist", position=point + 0.09 * axis,
-        anchor="center-center", visible=is_twist,
-    )  # fmt: skip
+    draw_label(
+        scene, "/words/weakest twist", "weakest twist", point + 0.09 * axis, visible=is_twist
+    )
     points = [tip[None] + 0.1 * push] if is_push else []
     return [*points, vertices] if is_twist else points
-
-
-def draw_places(scene: Any, contacts: Floats, normals: Floats) -> Any:
-    """A disc at each of many places, to be coloured; not shown yet."""
-    from scipy.spatial import KDTree
-
-    distances: Any = KDTree(contacts).query(contacts, k=min(5, len(contacts)))[0]
-    radius = 0.95 * float(np.median(distances[:, -1]))
-    vertices, faces = disc_mesh(radius, 8)
-    # Each at a height of its own: discs in one plane would flicker.
-    lift = 0.004 + 0.006 * ((np.arange(len(contacts)) * 0.618034) % 1.0)
-    return scene.add_batched_meshes_simple(
-        "/places", vertices, faces, turned_to(normals), contacts - lift[:, None] * normals,
-        batched_colors=np.full((len(contacts), 3), 200, dtype=np.uint8), side="double", lod="off",
-        cast_shadow=False, receive_shadow=False, visible=False, flat_shading=True,
-    )  # fmt: skip
 
 
 def look(client: Any, at: float, far: float, azimuth: float) -> None:
