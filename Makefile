@@ -37,7 +37,7 @@ test-browser: $(READY) ## The viewer in a real browser: installs viser, Playwrig
 	    apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || \
 	    { echo "the browser tests need chromium: install it (Debian: apt install chromium)"; exit 1; }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 10 \
-	    --editable '.[view]' 'playwright>=1.50'
+	    --editable '.[view]' 'playwright>=1.50' 'axe-playwright-python>=0.1'
 	$(BIN)/pytest tests/browser
 
 wheel: $(READY) ## A wheel for this platform in out/wheels/, tried in an empty environment

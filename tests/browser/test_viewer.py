@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
@@ -25,6 +26,7 @@ from graspmoduli.viewing.browser.grasp_page import Shown
 from graspmoduli.viewing.browser.server import add_pages, open_server
 from graspmoduli.viewing.browser.shapes_page import ShapePage
 from graspmoduli.viewing.held import Hand
+from graspmoduli.viewing.page import page_of
 
 OBJECT = ROOT / "examples" / "objects" / "yogurt_bottle.ply"
 #: Software rendering, and nothing fetched behind our back.
@@ -392,6 +394,38 @@ def test_every_control_has_a_name_and_the_page_a_title(browser, served):
     window.page.close()
 
 
+def serious(window):
+    """What axe finds that keeps people out."""
+    found = Axe().run(window.page).response["violations"]
+    return [
+        (one["id"], [node["html"][:200] for node in one["nodes"]])
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def test_nothing_keeps_people_out(browser, served, found, tmp_path):
+    address, _ = served
+    window = ready(Window(browser, address))
+    # viser's own word about slow drawing is not ours, and goes by itself.
+    hide = (
+        "[...document.querySelectorAll('.mantine-Notification-root')].forEach(e => e.hidden = true)"
+    )
+    for tab in ("Grasp", "See", "Pull", "Save"):
+        window.page.get_by_role("tab", name=tab).click()
+        time.sleep(0.5)
+        window.page.evaluate(f"() => {hide}")
+        assert serious(window) == []
+    window.page.close()
+    path = tmp_path / "bottle.html"
+    path.write_text(page_of(*found, Hand(), "bottle.ply"))
+    for scheme in ("light", "dark"):
+        saved = Window(browser, path.as_uri())
+        saved.page.emulate_media(color_scheme=scheme)
+        assert serious(saved) == []
+        saved.page.close()
+
+
 def settled(page):
     """The camera has come to rest."""
 
@@ -442,9 +476,13 @@ def test_the_space_of_shapes(browser):
     wait(lambda: window.drawn() > 0.01)
     pages[0].move(np.array([0.1, 0.8, 0.1]))
     wait(lambda: window.quality() != before)
-    pages[0].way.value = "ascent"
+    pages[0].way.value = "climbing where it arrives (ascent)"
     naive = window.quality()
     wait(lambda: window.quality() > naive)
+    # The triangle has a key, and the window a title.
+    wait(lambda: "In the triangle" in pages[0].key.content)
+    assert window.page.title() == "the space of shapes – graspmoduli"
+    assert pages[0].chart.scales["y"].get("range")[1] > window.quality()
     assert window.errors == []
     assert window.outside == []
     window.page.close()

@@ -149,8 +149,8 @@ def ranking(values: Sequence[float], chosen: int, hand: Hand) -> str:
             f"style='width:{width:.0f}%'></div></td><td>{best}</td></tr>"
         )
     return block(
-        f"<table class='gm-table' data-ranking><thead><tr><th></th><th>grasp</th>"
-        f"<th>{name_of(hand)}</th><th></th><th></th></tr></thead><tbody>{''.join(rows)}</tbody>"
+        f"<table class='gm-table' data-ranking><thead><tr><td></td><th>grasp</th>"
+        f"<th>{name_of(hand)}</th><td></td><td></td></tr></thead><tbody>{''.join(rows)}</tbody>"
         "</table>"
     )
 

@@ -116,7 +116,7 @@ class GraspPage:
             words.block(f"<h1 style='font-size:1.1em;margin:4px 0'>{escape(shown.name)}</h1>")
         )
         self.text = gui.add_html("")
-        self.improve = gui.add_button("Improve this grasp")
+        self.improve = gui.add_button("Improve this grasp", color=(0, 80, 130))
         self.acts = gui.add_button_group("", ("Undo", "Revert", "Home"))
         self.said = gui.add_html("")
         tabs = gui.add_tab_group()

@@ -6,6 +6,7 @@
   const name = "@NAME@";
   document.title = name + " – graspmoduli";
   document.documentElement.lang = "en";
+  document.getElementById("root")?.setAttribute("role", "main");
   new MutationObserver(() => {
     if (!document.title.startsWith(name)) document.title = name + " – graspmoduli";
   }).observe(document.head, { childList: true, subtree: true, characterData: true });

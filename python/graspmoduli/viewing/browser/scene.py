@@ -140,11 +140,3 @@ def draw_weakest(
     )
     points = [tip[None] + 0.1 * push] if is_push else []
     return [*points, vertices] if is_twist else points
-
-
-def look(client: Any, at: float, far: float, azimuth: float) -> None:
-    """From an azimuth, a little above, at a point of the first axis."""
-    away = np.array([np.cos(azimuth), np.sin(azimuth), 0.35])
-    # Moving the camera takes what it looks at along, so that comes last.
-    client.camera.position = far * away + [at, 0.0, 0.0]
-    client.camera.look_at = (at, 0.0, 0.0)
