@@ -11,7 +11,7 @@ from .drawing import FINGERS, NET
 from .held import Hand, Held
 
 #: Good news and bad, readable on white and on dark.
-GOOD, BAD = "good", "bad"
+GOOD, BAD, UNSURE = "good", "bad", "unsure"
 #: Share of a pad that is little to bear.
 LITTLE = 0.4
 
@@ -22,7 +22,7 @@ def block(text: str, style: str = "") -> str:
 
 
 def truth(fit: Fit, held: Held, untrue: str) -> tuple[str, str]:
-    """Is the grasp true on the object? Good or bad, and the sentence."""
+    """Is the grasp true on the object? Good, bad or unsure, and the sentence."""
     if untrue:
         return BAD, f"Not true on the object: {untrue}"
     if fit.mesh is not None:
@@ -34,11 +34,12 @@ def truth(fit: Fit, held: Held, untrue: str) -> tuple[str, str]:
         if least < LITTLE:
             text += f" But as little as {least:.0%} of a pad bears: it is thin there."
         return GOOD, text
+    seen = f" {fit.coverage:.0%} of the fitted surface was seen."
     if held.unseen:
         names = " and ".join(str(k) for k in held.unseen)
         who = f"finger {names} touches" if len(held.unseen) == 1 else f"fingers {names} touch"
-        return BAD, (f"Not sure: {who} what was not seen; the object may be otherwise there.")
-    return GOOD, "True as far as was seen: every finger touches points that were seen."
+        return UNSURE, f"Not sure: {who} what was not seen; the object may be otherwise.{seen}"
+    return GOOD, f"True as far as was seen: every finger touches points that were seen.{seen}"
 
 
 def known(fit: Fit) -> str:
@@ -101,9 +102,10 @@ def state(
     """The truth, then Q and what it means. The heights of the lines do not change."""
     kind, sentence = truth(fit, held, untrue)
     closed = value > 0.0
+    shade = GOOD if kind == GOOD else BAD
     changed = f" · <b>{escape(modified)}</b>" if modified else ""
     return block(
-        f"<div data-truth='{kind}' class='gm-{kind}' style='min-height:4.2em'>"
+        f"<div data-truth='{kind}' class='gm-{shade}' style='min-height:4.2em'>"
         f"{'✓' if kind == GOOD else '⚠'} {escape(sentence)}</div>"
         f"<div style='display:flex;align-items:center;justify-content:space-between'>"
         f"<span style='font-size:1.5em'>{name_of(hand)} = <b data-quality>{value:.4f}</b></span>"

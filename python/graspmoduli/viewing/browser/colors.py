@@ -98,8 +98,15 @@ class Colors:
         self.drawn: Any = None
         self.parts: Any = None
         self.dragged: int | None = None
+        # Of a large mesh it takes a second: a finger may be dragged before that.
+        threading.Thread(target=self._prepare, daemon=True).start()
         self.mode.on_update(lambda _: self.refresh())
         self.bar.on_update(lambda _: self.refresh())
+
+    def _prepare(self) -> None:
+        places = self.page.touch.places
+        if len(places.contacts):
+            self.skin = Skin(self.page.fit, places)
 
     @property
     def on(self) -> bool:

@@ -52,15 +52,16 @@
     }
   };
   const text = (selector) => document.querySelector(selector)?.innerText || "";
+  const said = { good: " · true on the object", bad: " · not true: see panel", unsure: " · not sure: see panel" };
   const refresh = () => {
     named();
     const value = text("[data-quality]");
     if (!value) return;
     const truth = document.querySelector("[data-truth]");
     const kind = truth ? truth.dataset.truth : "good";
-    const shown = `Q ${value} · ${text("[data-closure]")}` + (truth ? (kind === "good" ? " · true on the object" : " · not true: see panel") : "");
+    const shown = `Q ${value} · ${text("[data-closure]")}` + (truth ? said[kind] : "");
     if (bar.textContent !== shown) bar.textContent = shown;
-    bar.className = "gm-" + kind;
+    bar.className = kind === "good" ? "gm-good" : "gm-bad";
   };
   let planned = 0;
   new MutationObserver(() => {
