@@ -1,6 +1,8 @@
 //! One grasp after the other: which kernel answers, and in which order it looks at the contacts.
 
+use super::facets::Enough;
 use super::gradient::{self, Gradient};
+use super::hull::Hull;
 use super::metric::Metric;
 use super::plane::Three;
 use super::polytope::{Distance, Polytope};
@@ -22,6 +24,7 @@ const MOST_EDGES: usize = 36;
 pub struct Evaluator {
     cone: FrictionCone,
     kernel: Kernel,
+    hull: Hull,
     polytope: Polytope,
     wrenches: Wrenches,
     /// The order in which contacts are looked at.
@@ -47,6 +50,7 @@ impl Evaluator {
         Self {
             cone: cone.clone(),
             kernel: Kernel::new(cone),
+            hull: Hull::new(),
             polytope: Polytope::default(),
             wrenches: Wrenches::new(),
             order: Vec::new(),
@@ -82,7 +86,7 @@ impl Evaluator {
         {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
-        self.expanded(contacts, center_of_mass, never)
+        self.expanded(contacts, center_of_mass, Enough::Never)
     }
 
     /// Is Q_l ≥ `threshold`? The same as comparing, but ends as soon as it is known.
@@ -110,8 +114,7 @@ impl Evaluator {
         {
             return longest.map_or(0.0, |vertex| vertex.quality());
         }
-        let below = |_, upper| upper < threshold;
-        self.expanded(contacts, center_of_mass, below)
+        self.expanded(contacts, center_of_mass, Enough::Below(threshold))
     }
 
     /// As [`Evaluator::weakest`] if Q_l is at least `threshold`; else some unit direction in which
@@ -132,8 +135,7 @@ impl Evaluator {
                 direction: vertex.twist.map(|x| x * quality),
             });
         }
-        let below = |_, upper| upper < threshold;
-        let distance = self.distance(contacts, center_of_mass, below)?;
+        let distance = self.distance(contacts, center_of_mass, Enough::Below(threshold))?;
         let metric = Metric::new(self.wrenches.reference, center_of_mass);
         Some(Weakest {
             quality: self.value(&distance),
@@ -156,8 +158,7 @@ impl Evaluator {
                 vertex.map_or(threshold, |vertex| vertex.quality())
             })
         } else {
-            let above = |lower, _| lower >= threshold;
-            self.expanded(contacts, center_of_mass, above)
+            self.expanded(contacts, center_of_mass, Enough::AtLeast(threshold))
         };
         quality.min(threshold)
     }
@@ -203,6 +204,7 @@ impl Evaluator {
         let Weakest { quality, direction } = *weakest;
         row[0] = quality;
         if quality > 0.0 {
+            self.wrenches.list();
             let mut shares = vec![Default::default(); contacts.len()];
             let (wrenches, cone) = (&self.wrenches, &self.cone);
             if gradient::foot_point(wrenches, &direction, quality, center, cone, &mut shares) {
@@ -211,7 +213,7 @@ impl Evaluator {
         }
     }
 
-    /// The quality by the expanding polytope, whatever the number of contacts, with the direction in
+    /// The quality by an expanding polytope, whatever the number of contacts, with the direction in
     /// which the grasp is weakest.
     pub fn weakest(&mut self, contacts: &[Contact], center: DVec3) -> Weakest {
         self.set_wrenches(contacts);
@@ -224,7 +226,7 @@ impl Evaluator {
             };
         }
         let metric = Metric::new(self.wrenches.reference, center);
-        let distance = self.polytope.distance(&self.wrenches, metric, never);
+        let distance = self.distance_by(metric, Enough::Never);
         let quality = self.value(&distance);
         Weakest {
             quality: if self.too_few(contacts) { 0.0 } else { quality },
@@ -319,23 +321,30 @@ impl Evaluator {
         &mut self,
         contacts: &[Contact],
         center: DVec3,
-        enough: impl FnMut(f64, f64) -> bool,
+        enough: Enough,
     ) -> Option<Distance> {
         self.set_wrenches(contacts);
         if self.too_few(contacts) || self.wrenches.reference.is_point() {
             return None;
         }
         let metric = Metric::new(self.wrenches.reference, center);
-        Some(self.polytope.distance(&self.wrenches, metric, enough))
+        Some(self.distance_by(metric, enough))
+    }
+
+    /// The distance of the wrenches' hull by the facets in lanes or, where these cannot tell, by the
+    /// polytope.
+    fn distance_by(&mut self, metric: Metric, enough: Enough) -> Distance {
+        let Wrenches { points, norm, .. } = &mut self.wrenches;
+        let found = self.hull.distance(points, *norm, metric, enough);
+        found.unwrap_or_else(|| {
+            self.wrenches.list();
+            let enough = |lower, upper| enough.are(lower, upper);
+            self.polytope.distance(&self.wrenches, metric, enough)
+        })
     }
 
     /// The value by the expanding polytope.
-    fn expanded(
-        &mut self,
-        contacts: &[Contact],
-        center: DVec3,
-        enough: impl FnMut(f64, f64) -> bool,
-    ) -> f64 {
+    fn expanded(&mut self, contacts: &[Contact], center: DVec3, enough: Enough) -> f64 {
         match self.distance(contacts, center, enough) {
             Some(distance) => self.value(&distance),
             None => 0.0,
@@ -402,10 +411,6 @@ const BY_COMPARISON: [[usize; 3]; 8] = [
     [2, 0, 1],
     [2, 1, 0],
 ];
-
-fn never(_: f64, _: f64) -> bool {
-    false
-}
 
 /// Does a contact come before another in the order of [`compare`]?
 #[inline(always)]

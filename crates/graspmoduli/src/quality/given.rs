@@ -1,11 +1,15 @@
 //! The quality of wrenches that are given themselves: cones of any kind, suction, limits of force.
 
 use super::Twist;
+use super::facets::Enough;
+use super::hull::Hull;
 use super::metric::Metric;
+use super::points::Points;
 use super::polytope::Polytope;
 use super::r6::dot;
 use super::support::{Levels, Support};
 use super::wrenches::{Reference, mean};
+use crate::contact::Norm;
 use crate::error::Error;
 use crate::parallel::*;
 use glam::DVec3;
@@ -90,7 +94,15 @@ pub fn of_wrenches(wrenches: &[Twist]) -> Result<f64, Error> {
         scale: torque / force,
     };
     let metric = Metric::new(reference, DVec3::ZERO);
-    let found = Polytope::default().distance(&Given(scaled), metric, |_, _| false);
+    let mut points = Points::default();
+    points.shape(scaled.len(), 1);
+    for (index, point) in scaled.iter().enumerate() {
+        points.set(0, index, point);
+    }
+    points.fill(0);
+    let found = Hull::new()
+        .distance(&mut points, Norm::Sum, metric, Enough::Never)
+        .unwrap_or_else(|| Polytope::default().distance(&Given(scaled), metric, |_, _| false));
     if found.converged {
         return Ok(found.upper * force);
     }

@@ -112,6 +112,7 @@ pub(super) fn of_vertex(
         let mut all = Wrenches::new();
         let found = nearest && {
             all.set(contacts, &order, cone);
+            all.list();
             foot_point(&all, &direction, value, center, cone, &mut shares)
         };
         // Weights that left the cone are no element of the generalised gradient.

@@ -1,8 +1,10 @@
 //! The metric of the paper's Q in the coordinates in which a hull is expanded.
 
+use super::lanes::{Lane, splat_each};
 use super::r6::{Twist, unit};
 use super::wrenches::Reference;
 use glam::DVec3;
+use pulp::Simd;
 
 /// Lengths of twists about the centre of mass, of which the hull's coordinates are about another
 /// point and in another unit of length.
@@ -44,6 +46,21 @@ impl Metric {
     pub fn square(self, x: &Twist) -> f64 {
         let [linear, angular] = self.about_center(x);
         linear.length_squared() + angular.length_squared()
+    }
+
+    /// The same of some twists, a lane each.
+    #[inline(always)]
+    pub fn squares<S: Simd>(self, simd: S, x: &[Lane<S>; 6]) -> Lane<S> {
+        let unit = Lane::splat(simd, self.unit);
+        let turn = Lane::splat(simd, self.unit / self.scale);
+        let [a, b, c] = splat_each(simd, self.shift.to_array());
+        let [d, e, f] = [x[3] * turn, x[4] * turn, x[5] * turn];
+        let [u, v, w] = [
+            x[0] * unit - (e * c - f * b),
+            x[1] * unit - (f * a - d * c),
+            x[2] * unit - (d * b - e * a),
+        ];
+        ((u * u + v * v) + w * w) + ((d * d + e * e) + f * f)
     }
 
     #[inline(always)]

@@ -1,19 +1,24 @@
 //! The grasp quality Q_l (Sec. II): distance from the origin to the boundary of the wrench hull.
 //!
-//! Three hard contacts have a closed form ([`three_contacts`]); any other grasp, norm or cone goes
-//! by an expanding polytope ([`polytope`]) that needs no more than the hull's farthest points.
+//! Three hard contacts have a closed form ([`three_contacts`]); any other grasp or norm goes by an
+//! expanding polytope in lanes ([`hull`]). What that leaves unclear, and smooth cones, go by one
+//! ([`polytope`]) that needs no more than the hull's farthest points.
 
 mod apex_ray_face;
 mod batch;
 mod effort;
 mod evaluator;
+mod facets;
 mod force_closure;
 mod given;
 mod gradient;
+mod hull;
 mod instructions;
 mod lanes;
 mod metric;
+mod pivots;
 mod plane;
+mod points;
 mod polytope;
 mod r6;
 mod ray_ray_ray;

@@ -60,7 +60,7 @@ impl Distance {
     }
 
     /// Nothing is known but that the distance is at least 0.
-    const UNKNOWN: Self = Self {
+    pub const UNKNOWN: Self = Self {
         lower: 0.0,
         upper: f64::INFINITY,
         direction: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -68,7 +68,7 @@ impl Distance {
     };
 
     /// Takes the direction x, in which the hull reaches up to ⟨x, ·⟩ = height.
-    fn take(&mut self, height: f64, x: &Twist, metric: Metric) {
+    pub fn take(&mut self, height: f64, x: &Twist, metric: Metric) {
         let length = metric.length(x);
         if height / length < self.upper {
             self.upper = height / length;

@@ -1,5 +1,6 @@
 //! Wrench hulls of any number of contacts, by their farthest points.
 
+use super::points::Points;
 use super::r6::{Twist, add, dot};
 use super::support::{Levels, Support};
 use crate::contact::{Contact, Frame, FrictionCone, Norm};
@@ -65,7 +66,9 @@ impl Reference {
 /// The wrenches of a grasp with polygonal cones.
 #[derive(Debug, Clone)]
 pub(super) struct Wrenches {
-    /// Contact after contact, in an order of their own.
+    /// A group for each contact, in an order of their own.
+    pub points: Points,
+    /// The same as a list, once it was asked for; see [`Wrenches::list`].
     pub all: Vec<Twist>,
     order: Vec<usize>,
     per_contact: usize,
@@ -76,6 +79,7 @@ pub(super) struct Wrenches {
 impl Wrenches {
     pub fn new() -> Self {
         Self {
+            points: Points::default(),
             all: Vec::new(),
             order: Vec::new(),
             per_contact: 1,
@@ -94,14 +98,24 @@ impl Wrenches {
         self.norm = cone.norm();
         self.order.clear();
         self.order.extend_from_slice(order);
-        self.all.clear();
-        for &i in order {
+        self.points.shape(self.per_contact, order.len());
+        for (group, &i) in order.iter().enumerate() {
             let contact = &contacts[i];
             let frame = Frame::new(contact.normal);
-            self.all.extend((0..self.per_contact).map(|k| {
+            for k in 0..self.per_contact {
                 let (local, spin) = cone.generator(i, k);
-                self.reference.wrench(contact, frame.turn(local), spin)
-            }));
+                let wrench = self.reference.wrench(contact, frame.turn(local), spin);
+                self.points.set(group, k, &wrench);
+            }
+            self.points.fill(group);
+        }
+        self.all.clear();
+    }
+
+    /// Lists the wrenches contact after contact, for what looks at one after the other.
+    pub fn list(&mut self) {
+        if self.all.is_empty() {
+            self.points.list(&mut self.all);
         }
     }
 
