@@ -1,6 +1,6 @@
 //! One grasp after the other: which kernel answers, and in which order it looks at the contacts.
 
-use super::facets::Enough;
+use super::enough::Enough;
 use super::gradient::{self, Gradient};
 use super::hull::Hull;
 use super::metric::Metric;

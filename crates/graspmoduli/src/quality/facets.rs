@@ -7,8 +7,10 @@
 //! neighbours are kept: the ridges about the facets that see a new point are found by comparing their
 //! masks with those of the facets that do not. What is not clear beyond rounding is left undone.
 
+use super::enough::Enough;
 use super::lanes::{LANES, Lane, Lanes, Table, load, splat_each};
 use super::metric::Metric;
+use super::neighbors::{MOST_POINTS, Mask, Missing};
 use super::pivots::FirstSimplex;
 use super::points::{Farthest, Points, dot, first_equal, lane_of};
 use super::polytope::Distance;
@@ -24,33 +26,6 @@ pub(super) const EPSILON: f64 = 1e-9;
 const ROUNDING: f64 = 1e-13;
 /// Facets at a time before the other polytope is asked.
 const MOST_FACETS: usize = 1 << 12;
-/// Points at a time: bits of a mask.
-const MOST_POINTS: usize = 64;
-
-/// When the search may end before the distance is known.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Enough {
-    Never,
-    /// The distance is below this.
-    Below(f64),
-    /// The distance is at least this.
-    AtLeast(f64),
-}
-
-impl Enough {
-    /// Are these bounds enough?
-    #[inline(always)]
-    pub fn are(self, lower: f64, upper: f64) -> bool {
-        match self {
-            Enough::Never => false,
-            Enough::Below(threshold) => upper < threshold,
-            Enough::AtLeast(threshold) => lower >= threshold,
-        }
-    }
-}
-
-/// Six points of those that are inserted, a bit each.
-type Mask = u64;
 
 /// Working memory.
 #[derive(Debug, Clone, Default)]
@@ -217,19 +192,11 @@ impl Facets {
         self.created.clear();
         self.created_masks.clear();
         for from in (0..visible).step_by(64) {
-            let missing = self.missing(from..visible.min(from + 64));
+            let part = &self.visible[from..visible.min(from + 64)];
+            let missing = Missing::of(&self.masks, part);
             for k in 0..candidates {
                 let mask = self.candidate_masks[k];
-                // Of which facets one of these points is missing, and of which two.
-                let (mut once, mut twice) = (0, 0);
-                let mut rest = mask;
-                for _ in 0..6 {
-                    let point = rest.trailing_zeros() as usize % MOST_POINTS;
-                    rest &= rest.wrapping_sub(1);
-                    twice |= once & missing[point];
-                    once |= missing[point];
-                }
-                let mut met = !twice;
+                let mut met = missing.neighbors(mask);
                 while met != 0 {
                     let own = self.visible[from + met.trailing_zeros() as usize] as usize;
                     met &= met - 1;
@@ -274,20 +241,6 @@ impl Facets {
             }
         }
         Some((visible, seen))
-    }
-
-    /// For each point the facets of a part of the visible ones that are without it, a bit each.
-    #[inline(always)]
-    fn missing(&self, part: std::ops::Range<usize>) -> [u64; MOST_POINTS] {
-        let mut missing = [u64::MAX; MOST_POINTS];
-        for (bit, &facet) in self.visible[part].iter().enumerate() {
-            let mut rest = self.masks[facet as usize];
-            for _ in 0..6 {
-                missing[rest.trailing_zeros() as usize % MOST_POINTS] &= !(1 << bit);
-                rest &= rest.wrapping_sub(1);
-            }
-        }
-        missing
     }
 
     /// Creates the facet through a new point and the ridge between two, of which the first sees the point

@@ -1,7 +1,7 @@
 //! The quality of wrenches that are given themselves: cones of any kind, suction, limits of force.
 
 use super::Twist;
-use super::facets::Enough;
+use super::enough::Enough;
 use super::hull::Hull;
 use super::metric::Metric;
 use super::points::Points;

@@ -7,15 +7,19 @@
 mod apex_ray_face;
 mod batch;
 mod effort;
+mod enough;
 mod evaluator;
 mod facets;
 mod force_closure;
 mod given;
 mod gradient;
 mod hull;
+#[cfg(test)]
+mod hull_tests;
 mod instructions;
 mod lanes;
 mod metric;
+mod neighbors;
 mod pivots;
 mod plane;
 mod points;

@@ -134,6 +134,19 @@ impl Pivots {
         entries
     }
 
+    /// How deep a point lies in the cone opposite to the basic points, the sides of which have
+    /// normals of one over these lengths.
+    #[inline(always)]
+    fn depth<S: Simd>(&self, simd: S, point: &Twist, shares: &[f64; 6]) -> f64 {
+        let entries = self.entries(simd, point);
+        let mut least = f64::INFINITY;
+        for k in 0..6 {
+            let depth = -entries[k] * shares[k];
+            least = if depth < least { depth } else { least };
+        }
+        least
+    }
+
     /// Exchanges a column for a point of the hull, so that the weights stay positive; the row of
     /// the inverse that belongs to it.
     #[inline(always)]
@@ -178,8 +191,8 @@ impl Pivots {
         Some(head)
     }
 
-    /// The simplex of the columns and a seventh point: of those listed the one that is deepest in
-    /// the cone opposite to theirs, or that inside, −d, if it is deeper.
+    /// The simplex of the columns and a seventh point: the one that is deepest in the cone opposite
+    /// to theirs of those listed or, of sums, of two; or that inside, −d, if it is deeper.
     #[inline(always)]
     fn simplex<S: Simd>(
         &self,
@@ -189,27 +202,40 @@ impl Pivots {
         levels: Levels,
         inside: &Twist,
     ) -> First {
-        let mut seventh = (*inside, 1.0);
-        if norm == Norm::Sum {
-            let mut depth = f64::INFINITY;
-            let mut shares = [0.0; 6];
-            for k in 0..6 {
-                let mut square = 0.0;
-                for i in 0..6 {
-                    square += self.inverse[i][k] * self.inverse[i][k];
-                }
-                shares[k] = 1.0 / square.sqrt();
-                let own = self.weights[k] * shares[k];
-                depth = if own < depth { own } else { depth };
+        let facet = self.polar();
+        let mut shares = [0.0; 6];
+        let mut across = [0.0; 6];
+        for k in 0..6 {
+            for i in 0..6 {
+                shares[k] += self.inverse[i][k] * self.inverse[i][k];
             }
-            let (block, lane, deepest) = points.deepest(simd, &self.inverse, &shares);
-            if deepest > depth {
-                let key = points.key(block, lane);
-                seventh = (points.point(block, lane), levels.of(key));
+            shares[k] = 1.0 / shares[k].sqrt();
+            for i in 0..6 {
+                across[i] -= self.inverse[i][k] * shares[k];
+            }
+        }
+        let mut seventh = (*inside, 1.0);
+        let mut depth = self.depth(simd, inside, &shares);
+        match norm {
+            Norm::Sum => {
+                let (block, lane, deepest) = points.deepest(simd, &self.inverse, &shares);
+                if deepest > depth {
+                    let key = points.key(block, lane);
+                    seventh = (points.point(block, lane), levels.of(key));
+                }
+            }
+            Norm::Each => {
+                for direction in [facet.map(|c| -c), across] {
+                    let far = points.farthest(simd, norm, &direction);
+                    let own = self.depth(simd, &far.point, &shares);
+                    if own > depth {
+                        depth = own;
+                        seventh = (far.point, levels.of(far.key));
+                    }
+                }
             }
         }
         let (point, level) = seventh;
-        let facet = self.polar();
         let entries = self.entries(simd, &point);
         let gap = level - r6::dot(&facet, &point);
         let mut longest = r6::dot(&facet, &facet);

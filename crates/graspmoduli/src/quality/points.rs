@@ -50,6 +50,11 @@ impl Points {
         }
     }
 
+    /// How many groups there are.
+    pub fn groups(&self) -> usize {
+        self.shape.1
+    }
+
     /// Blocks per group.
     pub fn blocks(&self) -> usize {
         self.shape.0.div_ceil(LANES)
@@ -194,13 +199,13 @@ impl Points {
     }
 
     /// Block and lane of the point that is deepest within a cone, all of whose sides' heights
-    /// Σ rows[i][k]·p_i, k < 6, are to be negative: the least of their depths.
+    /// Σ rows[i][k]·p_i, k < 6, are to be negative: the least of their depths, times a share of each.
     #[inline(always)]
     pub fn deepest<S: Simd>(
         &mut self,
         simd: S,
         rows: &[Lanes; 6],
-        lengths: &[f64; 6],
+        shares: &[f64; 6],
     ) -> (usize, usize, f64) {
         let mut most = Lane::splat(simd, f64::NEG_INFINITY);
         let zero = Lane::splat(simd, 0.0);
@@ -209,12 +214,12 @@ impl Points {
                 let point = load(simd, points, v);
                 let mut least = Lane::splat(simd, f64::INFINITY);
                 for side in 0..6 {
-                    let length = lengths[side];
                     let mut normal = [zero; 6];
                     for i in 0..6 {
                         normal[i] = Lane::splat(simd, rows[i][side]);
                     }
-                    least = least.min((zero - dot(&normal, &point)) * Lane::splat(simd, length));
+                    least =
+                        least.min((zero - dot(&normal, &point)) * Lane::splat(simd, shares[side]));
                 }
                 most = most.max(least);
                 S::as_mut_simd_f64s(&mut out.0).0[v] = least.value;
