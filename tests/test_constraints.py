@@ -99,6 +99,7 @@ def attack(fits, many, seed):
         rules = random_rules(random, fit)
         fingers = int(random.choice([2, 3, 3, 4]))
         torsion = 0.05 * fit.mesh.size if fingers == 2 or random.random() < 0.3 else 0.0
+        sentence = ""
         try:
             found = fit.synthesize(
                 contacts=fingers, torsion=torsion, top=3, constraints=gm.Constraints(**rules)
@@ -218,6 +219,7 @@ def test_a_payload_is_held_in_every_direction(fits):
 def test_transfer_keeps_rules():
     bottle, mug = fit_of("bottle"), fit_of("mug")
     best = bottle.synthesize(top=1)[0]
+    assert mug.mesh is not None
     size = mug.mesh.size
     middle = mug.mesh.vertices.mean(axis=0)
     rules = {"table": (middle, np.array([0.0, 0.0, 1.0])), "opening": (0.0, 0.9 * size)}

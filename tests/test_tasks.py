@@ -260,7 +260,7 @@ class TestGraspsForATask:
         axis = fit.pose[:3, 2]
         lid = np.concatenate([np.zeros((2, 3)), [axis, -axis]], axis=1)
         found = fit.synthesize(task=lid)
-        values = [grasp.task_quality for grasp in found]
+        values = [grasp.task_quality or 0.0 for grasp in found]
         assert values == sorted(values, reverse=True)
         assert found[0].task_quality == gm.task_quality(found[0], task=lid)
         assert values[0] > 1.02 * max(gm.task_quality(g, task=lid) for g in fit.synthesize())

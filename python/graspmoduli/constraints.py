@@ -80,7 +80,7 @@ class Constraints(Value):
     """
 
     #: Least and largest distance between any two contacts.
-    opening: tuple[float, float] | None = None
+    opening: Any = None
     #: Least gap between any two fingertips.
     gap: float | None = None
     #: A direction in which the hand comes, and the largest angle between it and the way along which

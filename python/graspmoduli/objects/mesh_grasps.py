@@ -48,7 +48,7 @@ class Search(NamedTuple):
     #: Errors of aim, in the object's unit.
     errors: float
     #: Where fingers may go.
-    constraints: Constraints
+    constraints: Constraints = Constraints()
     #: Loads that grasps are for, (k, 6) with torques in the object's unit; None if for all.
     task: Floats | None = None
     #: Do grasps climb on the mesh itself, or only from place to place?

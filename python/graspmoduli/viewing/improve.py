@@ -10,7 +10,7 @@ import numpy as np
 from .._batches import fingers as cone_of
 from .._core import GraspModuliError
 from ..grasps import Grasp
-from ..objects.touching import Search, press
+from ..objects.mesh_grasps import Search, press
 from ..transfers import transfer
 from .held import EDGE, Contact, Hand, Held, Touch
 
