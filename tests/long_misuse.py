@@ -114,7 +114,7 @@ def functions() -> dict[str, Callable[..., Any]]:
         kind = type(thing).__name__
         names = [name for name in dir(thing) if not name.startswith("_")]
         found |= {f"{kind}.{name}": getattr(thing, name) for name in names}
-    errors = (gm.GraspModuliError, gm.MissingExtraError)
+    errors = (gm.GraspModuliError, gm.MissingExtraError, gm.NoGraspLeftError)
     return {
         name: value
         for name, value in found.items()

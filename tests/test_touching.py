@@ -96,7 +96,8 @@ def test_two_soft_fingers_hold():
     best = fit.synthesize(contacts=2, torsion=0.01, top=1)[0]
     assert best.contacts.shape == (2, 3)
     assert gm.quality(best) == best.quality > 0.0
-    assert not fit.synthesize(contacts=2, top=1)
+    with pytest.raises(gm.GraspModuliError, match="torsion must be positive for two contacts"):
+        fit.synthesize(contacts=2, top=1)
 
 
 def test_fingers_with_a_limit_each_hold_more():
@@ -301,20 +302,26 @@ class TestMesh:
         with pytest.raises(gm.GraspModuliError, match=sentence):
             fit.synthesize(**options)
 
-    def test_a_cloud_of_points_has_three_hard_fingers(self):
+    def test_a_cloud_of_points_takes_any_fingers(self):
         fit = quiet_fit(
             np.asarray(trimesh.sample.sample_surface(objects_made.bottle(), 3000, seed=0)[0])
         )
         assert fit.mesh is None
-        assert fit.synthesize(top=1)
         several: list[dict[str, Any]] = [
-            {"errors": 0.01},
+            {},
             {"contacts": 4},
-            {"torsion": 1.0},
+            {"contacts": 2, "torsion": 0.01},
+            {"norm": "each"},
+            {"constraints": gm.Constraints(opening=(0.0, 0.15))},
         ]
         for options in several:
-            with pytest.raises(gm.GraspModuliError, match="cloud of points"):
-                fit.synthesize(**options)
+            found = fit.synthesize(top=2, **options)
+            assert found
+            for grasp in found:
+                assert len(grasp.contacts) == options.get("contacts", 3)
+                assert gm.quality(grasp) == grasp.quality > 0.0
+        with pytest.raises(gm.GraspModuliError, match="errors must be left out"):
+            fit.synthesize(errors=0.01)
 
     def test_transfers_end_on_the_mesh(self):
         source, target = quiet_fit(objects_made.bottle()), quiet_fit(CUP)

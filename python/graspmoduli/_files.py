@@ -9,7 +9,6 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from ._core import GraspModuliError
 
@@ -38,22 +37,6 @@ def check_output(name: str, path: Path, others: Iterable[Path] = ()) -> None:
         Path(probe).unlink()
     except (OSError, ValueError) as error:
         raise _unwritable(path, error) from None
-
-
-def read_toml(name: str, path: Path) -> dict[str, Any]:
-    """What a TOML file holds; ``name`` is what the caller calls it."""
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
-    try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise GraspModuliError(
-            f"{name} must be a whole TOML file, got {path} ({reason[:120]})"
-        ) from None
 
 
 @contextlib.contextmanager

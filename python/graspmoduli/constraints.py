@@ -23,7 +23,7 @@ from ._arrays import (
     vectors,
 )
 from ._core import GraspModuliError
-from ._files import read_toml
+from ._toml import read_toml
 from ._values import Value
 from .measures import measures
 from .tasks import gravity
@@ -41,6 +41,8 @@ from .zones import (
 
 #: Constraints are met with this to spare, over the object's size: rounding breaks none.
 SPARE = 1e-9
+#: A finger that presses along the border of the approach is within it, to rounding.
+ROUNDING = 1e-12
 #: A fingertip keeps clear of obstacles on the last part of its way, so many of its radii.
 WAY = 4.0
 
@@ -258,7 +260,7 @@ class Constraints(Value):
         approach = None
         if self.approach is not None:
             direction, angle = self.approach
-            approach = (direction, math.cos(angle) + spare if angle < math.pi else -2.0)
+            approach = (direction, math.cos(angle) - ROUNDING if angle < math.pi else -2.0)
         own = [region for region in self.wanted if isinstance(region, tuple)]
         return (
             [low / size + spare if low > 0.0 else 0.0, high / size - spare],

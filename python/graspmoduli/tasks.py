@@ -18,7 +18,7 @@ from . import _core
 from ._arrays import Floats, a_path, brief, count, finite, floats, locked, number
 from ._batches import Batch, batch
 from ._core import GraspModuliError
-from ._files import read_toml
+from ._toml import read_toml
 from .quality import QualityGradient
 
 

@@ -95,11 +95,7 @@ def regions_of(name: str, value: Any) -> tuple[Any, ...]:
     return tuple(_region(name, one) for one in given)
 
 
-WANTED = {
-    "forbidden": "boxes and half-spaces",
-    "wanted": "regions",
-    "unwanted": "regions",
-}
+WANTED = {"forbidden": "boxes and half-spaces", "wanted": "regions", "unwanted": "regions"}
 
 
 def _region(name: str, value: Any) -> Any:

@@ -80,6 +80,7 @@ pub mod synthesis;
 #[cfg(feature = "objects")]
 pub mod touch;
 pub mod transfer;
+mod turned;
 mod zone;
 
 pub use contact::{Contact, FrictionCone, Norm};

@@ -8,7 +8,6 @@ use crate::bundle::{Coordinates, Ground};
 use crate::contact::FrictionCone;
 use crate::error::Error;
 use crate::limits::Limits;
-use crate::math;
 use crate::parallel::*;
 use crate::places::search::{MANY, candidates};
 use crate::places::{Place, Wanted};
@@ -16,6 +15,7 @@ use crate::quality::{Evaluator, Twist};
 use crate::region::Region;
 use crate::sampling::by_area;
 use crate::surface::Surface;
+use crate::turned::different;
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -108,50 +108,5 @@ pub fn grasps(
         return Err(Error::Interrupted);
     }
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut kept: Vec<(Coordinates, f64)> = Vec::new();
-    let turns = if surface.is_round() {
-        [true, false].as_slice()
-    } else {
-        &[false]
-    };
-    for &turned in turns {
-        for grasp in &found {
-            if kept.len() < request.top
-                && kept
-                    .iter()
-                    .all(|other| !alike(surface, &grasp.0, &other.0, &wanted, turned))
-            {
-                kept.push(grasp.clone());
-            }
-        }
-    }
-    kept.sort_by(|a, b| b.1.total_cmp(&a.1));
-    Ok(kept)
-}
-
-/// Are two grasps the same, perhaps after a turn about the axis?
-fn alike(
-    surface: &Surface,
-    one: &Coordinates,
-    other: &Coordinates,
-    wanted: &Wanted<'_>,
-    turned: bool,
-) -> bool {
-    let places = |at: &Coordinates, turn: f64| -> Vec<Place> {
-        let (sin, cos) = math::sin_cos(turn);
-        at.iter()
-            .map(|&[u, theta]| {
-                let DVec3 { x, y, z } = surface.contact(u, theta).point;
-                let point = DVec3::new(x * cos - y * sin, x * sin + y * cos, z);
-                Place::flat(point, DVec3::Z)
-            })
-            .collect()
-    };
-    let there = places(other, 0.0);
-    if !turned {
-        return !wanted.differ(&places(one, 0.0), &there);
-    }
-    other
-        .iter()
-        .any(|at| !wanted.differ(&places(one, at[1] - one[0][1]), &there))
+    Ok(different(surface, found, &wanted))
 }

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import Floats, brief, finite, floats, number
 from .._core import GraspModuliError
-from .._files import read_toml
+from .._toml import read_toml
 from .files import check_exists, from_file
 from .views import View, of_camera, of_depth, of_image
 

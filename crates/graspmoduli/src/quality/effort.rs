@@ -1,13 +1,11 @@
 //! The least effort of fingers against a load, as a linear program in six rows, and one per finger
 //! with a limit of its own.
 
+use super::orthonormal::orthonormal;
 use super::r6::Twist;
-use super::simplex::{BALANCED, Simplex, dot};
+use super::simplex::{BALANCED, Simplex};
 use crate::contact::{Contact, Frame, FrictionCone, Norm};
 use glam::DVec3;
-
-/// Rows of which less than this is left are combinations of others.
-const FLAT: f64 = 1e-12;
 
 /// The linear program of a grasp. However flat its wrenches are, its first rows are orthonormal.
 pub(super) struct Program {
@@ -144,34 +142,4 @@ impl Program {
             }
         })
     }
-}
-
-/// Makes the rows orthonormal, one after the other; the factors, and the rows that are none of the
-/// others' combinations.
-fn orthonormal(rows: &mut [Vec<f64>]) -> ([Twist; 6], Vec<usize>) {
-    let mut lower = [[0.0; 6]; 6];
-    let mut spanning: Vec<usize> = Vec::new();
-    for row in 0..6 {
-        let before = dot(&rows[row], &rows[row]).sqrt();
-        // Twice is enough.
-        for _ in 0..2 {
-            for &other in &spanning {
-                let along = dot(&rows[row], &rows[other]);
-                lower[row][other] += along;
-                let (one, two) = rows.split_at_mut(row);
-                for (x, q) in two[0].iter_mut().zip(&one[other]) {
-                    *x -= along * q;
-                }
-            }
-        }
-        let length = dot(&rows[row], &rows[row]).sqrt();
-        if length > FLAT * before {
-            lower[row][row] = length;
-            for x in &mut rows[row] {
-                *x /= length;
-            }
-            spanning.push(row);
-        }
-    }
-    (lower, spanning)
 }

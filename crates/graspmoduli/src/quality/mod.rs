@@ -20,6 +20,7 @@ mod instructions;
 mod lanes;
 mod metric;
 mod neighbors;
+mod orthonormal;
 mod pivots;
 mod plane;
 mod points;
