@@ -29,6 +29,7 @@ def report(
         "friction": friction,
         "edges": edges,
         "norm": norm,
+        "torsion": grasps[0].torsion if grasps else 0.0,
         "length_scale": fit.length_scale,
         "center_of_mass_of": _center_of(fit),
         "note": "contacts, normals and center_of_mass are in the coordinates of the object's "

@@ -138,8 +138,9 @@ fn farthest(map: &[Place], wanted: &Wanted<'_>) -> (Vec<usize>, Option<Together>
     let most_of = |share: f64, limit: usize| {
         // Where few pairs may be together, so may few subsets, and more places can be searched. Of
         // a triple two pairs count: near places have the same neighbours.
-        let pairs = fingers.saturating_sub(1) as i32;
-        let allowed = |n: usize| subsets(n, fingers) as f64 * share.powi(pairs);
+        let pairs = fingers.saturating_sub(1);
+        let allowed =
+            |n: usize| (0..pairs).fold(subsets(n, fingers) as f64, |count, _| count * share);
         let mut most = fingers;
         while most < limit && allowed(most + 1) <= budget as f64 {
             most += 1;

@@ -82,7 +82,7 @@ impl Wanted<'_> {
     }
 
     /// May fingers press at places together?
-    pub(crate) fn allow(&self, places: &[Place]) -> bool {
+    pub fn allow(&self, places: &[Place]) -> bool {
         self.limits.allow(&pressed(places))
     }
 

@@ -48,7 +48,7 @@ impl Program {
             Norm::Sum => 0,
             Norm::Each => contacts.len(),
         };
-        let mut table: Vec<Vec<f64>> = vec![Vec::with_capacity(wrenches); 6];
+        let mut table: Vec<Vec<f64>> = (0..6).map(|_| Vec::with_capacity(wrenches)).collect();
         for (i, contact) in contacts.iter().enumerate() {
             let frame = Frame::new(contact.normal);
             for k in 0..each {

@@ -187,9 +187,6 @@ impl Batch<'_> {
             evaluate(&contacts, self.centers[index].into(), &cone, own, slot);
             Ok(())
         };
-        out.par_chunks_mut(width)
-            .enumerate()
-            .map(of_grasp)
-            .collect()
+        out.par_chunks_mut(width).enumerate().try_for_each(of_grasp)
     }
 }
