@@ -42,7 +42,7 @@ def test_grasp_writes_table_json_and_picture(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
     report = json.loads(json_file.read_text())
     assert set(report) >= {"object", "fit", "friction", "edges", "length_scale", "grasps"}
-    assert set(report["fit"]) >= {"residual_rms", "residual_max", "coverage", "pose"}
+    assert set(report["fit"]) >= {"residual_rms", "residual_max", "coverage", "phantom", "pose"}
     assert report["schema"] == 1
     qualities = [grasp["round_quality"][0] for grasp in report["grasps"]]
     assert qualities == sorted(qualities, reverse=True)

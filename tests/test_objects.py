@@ -160,7 +160,8 @@ class TestFiles:
         np.testing.assert_array_equal(again.pose, fit.pose)
         np.testing.assert_array_equal(again.allowed, fit.allowed)
         assert again.residual == fit.residual
-        assert (again.coverage, again.unexplained) == (fit.coverage, fit.unexplained)
+        shares = (fit.coverage, fit.unexplained, fit.phantom)
+        assert (again.coverage, again.unexplained, again.phantom) == shares
         assert again.length_scale == fit.length_scale
         assert again.in_object(GRASP).quality == fit.in_object(GRASP).quality
         assert [p.name for p in tmp_path.iterdir()] == ["cup.npz"]
@@ -182,7 +183,7 @@ class TestFiles:
             gm.Fit.load(path)
         with path.open("wb") as file:
             np.savez(file, graspmoduli_fit=99)
-        with pytest.raises(gm.GraspModuliError, match="version 2, got version 99"):
+        with pytest.raises(gm.GraspModuliError, match="version 3, got version 99"):
             gm.Fit.load(path)
         with pytest.raises(gm.GraspModuliError, match="path must be the path of a file"):
             gm.Fit.load(None)  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import KDTree
 
 import graspmoduli as gm
 import objects_made
@@ -372,6 +373,36 @@ class TestAgreement:
         fit = gm.fit(objects_made.bottle())
         assert fit.unexplained < 0.01
         assert fit.coverage > 0.99
+        assert fit.phantom < 0.01
+        assert fit.residual.relative_max < 0.02
+
+    @pytest.mark.parametrize("name", ["mug", "bracket", "hammer", "wine_glass"])
+    def test_the_residual_is_of_the_whole_object(self, name):
+        made = objects_made.OBJECTS[name]()
+        fit = quiet_fit(made)
+        size = fit.residual.size
+        # From outside, by rays of other code, and from the surface by a fine grid of its points.
+        mesh = true_grasps.Mesh(made.vertices, made.faces)
+        points, faces = trimesh.sample.sample_surface(made, 500, seed=1)[:2]
+        normals = made.face_normals[faces]
+        seen = np.zeros(len(points), dtype=bool)
+        for k, (point, way) in enumerate(zip(mesh.local(points), normals, strict=True)):
+            seen[k] = any(
+                abs(mesh.ray(point - 3 * side, side)[0] - 3) < 3e-3 for side in (way, -way)
+            )
+        u, theta = np.meshgrid(np.linspace(0, 1, 200), np.linspace(0, 2 * np.pi, 300))
+        wall = fit.surface.points(u.ravel(), theta.ravel())
+        shares = np.linspace(0, 1, 60)[:, None, None]
+        ends = [wall.reshape(300, 200, 3)[:, end] for end in (0, -1)]
+        lids = [(end * [1, 1, 0] * shares + end * [0, 0, 1]).reshape(-1, 3) for end in ends]
+        tree = KDTree(fit.to_object(np.concatenate([wall, *lids])))
+        away = tree.query(points[seen])[0]
+        rms = np.sqrt((away**2).mean())
+        # 500 points tell it to some 10 %, and the grid is as fine as a hundredth of the size.
+        assert fit.residual.rms == pytest.approx(rms, rel=0.15, abs=0.002 * size)
+        assert fit.residual.max >= away.max() - 0.02 * size
+        assert fit.residual.max <= away.max() + 0.05 * size
+        assert fit.unexplained == pytest.approx((away > 0.02 * size).mean(), abs=0.06)
 
     def test_a_handle_is_not_explained_in_proportion_to_its_area(self):
         made = objects_made.mug()
@@ -392,4 +423,5 @@ class TestAgreement:
         mesh = true_grasps.Mesh(made.vertices, made.faces)
         points = fit.to_object(fit.surface.points(*gm.sample_points(fit.surface, 400)))
         far = np.mean([mesh.nearest(point)[0] > 0.02 for point in mesh.local(points)])
-        assert 1.0 - fit.coverage == pytest.approx(far, abs=0.06)
+        assert fit.phantom == pytest.approx(far, abs=0.06)
+        assert fit.phantom == 1.0 - fit.coverage

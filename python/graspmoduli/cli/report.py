@@ -23,6 +23,7 @@ def report(
             "size": fit.residual.size,
             "coverage": fit.coverage,
             "unexplained": fit.unexplained,
+            "phantom": fit.phantom,
             "pose": fit.pose.tolist(),
         },
         "scan": _scan(thing),

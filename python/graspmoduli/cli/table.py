@@ -19,8 +19,7 @@ def show(path: str, fit: Any, grasps: Any, edges: int) -> None:
     lines = [
         f"{path}: size {fit.residual.size:.4g}, axis ({axis})",
         f"fit: rms {fit.residual.relative_rms:.2%} and max {fit.residual.relative_max:.2%} of the "
-        f"size, {fit.coverage:.0%} of the surface seen, "
-        f"{fit.unexplained:.1%} of the wall unexplained",
+        f"size from the surface, {_shares(fit)}",
     ]
     digits = max(0, 3 - int(f"{fit.residual.size:e}".split("e")[1]))
     # Wide enough for the table when the output is not a terminal.
@@ -46,6 +45,19 @@ def show(path: str, fit: Any, grasps: Any, edges: int) -> None:
         ]
         for line in said:
             console.print(line, soft_wrap=True, markup=False)
+
+
+def _shares(fit: Any) -> str:
+    """How much of the object is explained, and how much of the surface is there."""
+    if fit.mesh is None:
+        return (
+            f"{fit.unexplained:.1%} of the wall unexplained; {fit.coverage:.0%} of the surface "
+            f"seen, {fit.phantom:.0%} of it seen to be empty"
+        )
+    return (
+        f"{fit.unexplained:.1%} of the object unexplained; {fit.phantom:.1%} of the surface with "
+        "no object near it"
+    )
 
 
 #: Qualities closer than this share are a tie: the fingers' own errors are larger.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 #: The version of the files that Fit.save writes.
-FILE_VERSION = 2
+FILE_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,11 @@ class Fitted(Value):
     #: cloud, where it was seen, as the rest is filled in smoothly.
     coverage: float
     #: Share of the object farther than 2 % of its size from the surface: of a mesh, of the area
-    #: visible from outside, the surface being closed by lids; of a cloud, of its outer wall.
+    #: visible from outside, the surface being closed by lids; of a cloud, of its outer wall's.
     unexplained: float
+    #: Share of the surface's area that no object is near: of a mesh, all that is not covered; of a
+    #: cloud, where a camera saw that there is nothing, or what is too far from all that was seen.
+    phantom: float
     #: Where contacts may lie: cells over u and θ that are explained or, of a scan, unseen.
     #: Shape (k, n).
     allowed: Booleans = field(repr=False)
@@ -160,7 +163,7 @@ class Fitted(Value):
                 heights=[self.surface.bottom, self.surface.top],
                 pose=self.pose,
                 residual=[self.residual.rms, self.residual.max, self.residual.size],
-                shares=[self.coverage, self.unexplained],
+                shares=[self.coverage, self.unexplained, self.phantom],
                 allowed=self.allowed,
                 part=self.part,
                 **({} if self.mesh is None else self.mesh.saved()),
@@ -177,13 +180,14 @@ class Fitted(Value):
                 if version == FILE_VERSION:
                     bottom, top = data["heights"].tolist()
                     residual = Residual(*data["residual"].tolist())
-                    coverage, unexplained = data["shares"].tolist()
+                    coverage, unexplained, phantom = data["shares"].tolist()
                     return cls(
                         surface=Surface.from_coefficients(data["coefficients"], bottom, top),
                         pose=locked(floats("pose", data["pose"]).reshape(4, 4)),
                         residual=residual,
                         coverage=coverage,
                         unexplained=unexplained,
+                        phantom=phantom,
                         allowed=data["allowed"].astype(bool, casting="no"),
                         part="part" in data and bool(data["part"]),
                         mesh=TriangleMesh.loaded(data, residual.size),

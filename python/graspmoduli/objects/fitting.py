@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import (
     Floats,
@@ -22,10 +22,9 @@ from .._arrays import (
 from .._core import GraspModuliError
 from ..surfaces import Surface
 from .agreement import Residual as Residual
-from .agreement import phantom_area, unexplained_area
+from .agreement import dilated, of_cloud, of_mesh
 from .axes import FARTHEST, candidate_axes, refined, same_axis, score
 from .fits import Fit as Fit
-from .likeness import cells
 from .object_grasps import ObjectGrasp as ObjectGrasp
 from .reading import Object, read
 from .scanned import Scanned
@@ -137,68 +136,69 @@ def fit_about(thing: Object, axis: Axis, stacklevel: int) -> Fit:
     explained = wall & (np.abs(distance) <= close)
     outside = distance > close
 
-    cells = grid.rows * grid.columns
-    seen = np.bincount(hits.cell[wall], minlength=cells) > 0
-    good = np.bincount(hits.cell[explained], minlength=cells) > 0
-    sticking = np.bincount(hits.cell[outside], minlength=cells) > (0 if mesh else 2)
+    shape_of_cells = (grid.rows, grid.columns)
+    seen = _hit(hits.cell[wall], shape_of_cells) > 0
+    good = _hit(hits.cell[explained], shape_of_cells) > 0
+    sticking = _hit(hits.cell[outside], shape_of_cells) > (0 if mesh else 2)
     pose, body = _pose(axis, middle), TriangleMesh.of(thing)
     if body is not None:
-        unexplained = unexplained_area(thing, body, surface, pose)
-        coverage = 1.0 - phantom_area(body, surface, pose)
-        if unexplained > WORTH_A_WARNING_OF_MESH or coverage < LEAST_COVERAGE:
+        found = of_mesh(thing, body, surface, pose)
+        if found.unexplained > WORTH_A_WARNING_OF_MESH or found.coverage < LEAST_COVERAGE:
             warnings.warn(
-                f"{unexplained:.0%} of the object's visible area is not explained by the fitted "
-                f"surface, and {1.0 - coverage:.0%} of the surface has no object near it; grasps "
-                "are true all the same, but have no contact coordinates off the surface",
+                f"{found.unexplained:.0%} of the object's visible area is not explained by the "
+                f"fitted surface, and {found.phantom:.0%} of the surface has no object near it; "
+                "grasps are true all the same, but have no contact coordinates off the surface",
                 stacklevel=stacklevel,
             )
     else:
-        unexplained = float((seen & (~good | sticking)).sum() / max(seen.sum(), 1))
-        coverage = _coverage(surface, good.reshape(grid.rows, grid.columns))
-        if unexplained > MOST_UNEXPLAINED:
+        empty = _is_empty(thing, _cells(surface, pose, shape_of_cells)[0])
+        found = of_cloud(thing, surface, pose, seen, good, seen & (~good | sticking), empty)
+        if found.unexplained > MOST_UNEXPLAINED:
             raise GraspModuliError(
                 "object must be close to a surface in cylindrical coordinates about some axis, "
-                f"got one whose outer wall is not for {unexplained:.0%}; a mesh of it could be "
-                "grasped all the same"
+                f"got one whose outer wall is not for {found.unexplained:.0%}; a mesh of it could "
+                "be grasped all the same"
             )
-        if unexplained > WORTH_A_WARNING:
+        if found.unexplained > WORTH_A_WARNING:
             warnings.warn(
-                f"{unexplained:.1%} of the object's outer wall is not explained by the fitted "
-                "surface; no grasp is offered there",
+                f"{found.unexplained:.1%} of the object's outer wall is not explained by the "
+                "fitted surface; no grasp is offered there",
                 stacklevel=stacklevel,
             )
     # A wall that leans more than the surface, such as a lid's rim, is not what a finger meets.
     crooked = np.abs(np.abs(normals[:, 2]) - hits.tilt) > 0.5
-    rough = mesh & (np.bincount(hits.cell[explained & crooked], minlength=cells) > 0)
-    bad = (sticking | rough | (seen & ~good)).reshape(grid.rows, grid.columns)
+    bad = sticking | (seen & ~good)
+    if mesh:
+        bad |= _hit(hits.cell[explained & crooked], shape_of_cells) > 0
     # A fingertip's width away from it.
-    allowed = ~_dilated(bad, 4 if mesh else 2)
+    allowed = ~dilated(bad, 4 if mesh else 2)
+    sure = None
     if mesh:
         # Where no ray hits a mesh there is nothing to touch.
-        allowed &= seen.reshape(grid.rows, grid.columns)
-    sure = None
-    if not mesh:
-        points, ways = _cells(surface, pose, allowed.shape)
+        allowed &= seen
+    else:
+        points, ways = _cells(surface, pose, shape_of_cells)
         allowed &= ~_closed(thing, points, ways)
         if thing.views:
             sure = meet(thing.views, points, ways, thing.size)
     rim = max(1, round(0.03 * grid.rows))
     allowed[:rim] = allowed[-rim:] = False
-
-    used = distance[explained]
-    residual = Residual(
-        rms=float(np.sqrt((used**2).mean())), max=float(np.abs(used).max()), size=thing.size
-    )
     return Fit(
         surface=surface,
         pose=pose,
-        residual=residual,
-        coverage=coverage,
-        unexplained=unexplained,
+        residual=found.residual,
+        coverage=found.coverage,
+        unexplained=found.unexplained,
+        phantom=found.phantom,
         allowed=allowed,
         mesh=body,
         scanned=None if mesh else Scanned(thing.points, thing.size, sure),
     )
+
+
+def _hit(cell: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
+    """How many of the hits are in each cell."""
+    return np.bincount(cell, minlength=shape[0] * shape[1]).reshape(shape)
 
 
 def _cells(surface: Surface, pose: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
@@ -213,11 +213,16 @@ def _cells(surface: Surface, pose: Floats, shape: tuple[int, ...]) -> tuple[Floa
     return surface.points(u, theta) @ turn + pose[:3, 3], surface.normals(u, theta) @ turn
 
 
-def _closed(thing: Object, points: Floats, ways: Floats) -> Booleans:
-    """Where a camera saw nothing, where the object cannot reach, or the table is in the way."""
-    closed = is_free(thing.views, points, thing.size)
+def _is_empty(thing: Object, points: Floats) -> Booleans:
+    """Where a camera saw nothing, or the object cannot reach."""
     away = points - thing.points.mean(axis=0)
-    closed |= np.sqrt((away * away).sum(axis=-1)) > FARTHEST * thing.size
+    beyond = np.sqrt((away * away).sum(axis=-1)) > FARTHEST * thing.size
+    return is_free(thing.views, points, thing.size) | beyond
+
+
+def _closed(thing: Object, points: Floats, ways: Floats) -> Booleans:
+    """Where there is nothing, or the table is in the way."""
+    closed = _is_empty(thing, points)
     if thing.table is not None:
         # Neither the tip nor a finger as long as the object may reach into it; what lies flat is
         # held by less of a tip.
@@ -232,21 +237,3 @@ def _pose(axis: Axis, middle: float) -> Floats:
     pose[:3, :3] = axis.rotation
     pose[:3, 3] = axis.origin + axis.rotation[:, 2] * middle
     return locked(pose)
-
-
-def _coverage(surface: Surface, good: Booleans) -> float:
-    """Share of the area in cells where a cloud was seen, small holes between its points aside."""
-    area = cells(surface, np.eye(4), np.ones_like(good))[1].reshape(good.shape)
-    covered = ~_dilated(~_dilated(good, 1), 1)
-    return float(area[covered].sum() / area.sum())
-
-
-def _dilated(cells: Booleans, reach: int) -> Booleans:
-    """Cells and their neighbours; columns wrap around."""
-    out = cells.copy()
-    for _ in range(reach):
-        grown = out | np.roll(out, 1, axis=1) | np.roll(out, -1, axis=1)
-        grown[1:] |= out[:-1]
-        grown[:-1] |= out[1:]
-        out = grown
-    return out

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .._arrays import Floats, a_callback, finite, locked, vectors
 from .._core import GraspModuliError
 from .._values import Value
-from .agreement import Residual, distances, phantom_area, visible
+from .agreement import distances, phantom_area, residual_of, visible
 from .axes import candidate_axes, refined, same_axis, score
 from .fits import Fit
 from .fitting import fit_about, fit_object
@@ -250,20 +250,17 @@ def _as_part(fit: Fit, body: TriangleMesh, points: Floats, own: Booleans) -> Fit
     """A fit of a piece as a part of the whole object, to which some of the points belong."""
     from scipy.spatial import KDTree
 
-    away = distances(points[own], fit.surface, fit.pose)
+    phantom = phantom_area(body, fit.surface, fit.pose)
     places, _ = cells(fit.surface, fit.pose, np.ones_like(fit.allowed))
     near: Any = KDTree(points[own]).query(places)[0]
     there = (near <= 1.5 * CLOSE * body.size).reshape(fit.allowed.shape)
     return Fit(
         surface=fit.surface,
         pose=fit.pose,
-        residual=Residual(
-            rms=float(np.sqrt((away * away).mean())),
-            max=float(away.max()),
-            size=body.size,
-        ),
-        coverage=1.0 - phantom_area(body, fit.surface, fit.pose),
+        residual=residual_of(points[own], fit.surface, fit.pose, body.size),
+        coverage=1.0 - phantom,
         unexplained=1.0 - float(own.mean()),
+        phantom=phantom,
         allowed=there,
         part=True,
         mesh=body,
