@@ -34,6 +34,8 @@ LEAST = 0.005
 SMALL = 0.05
 #: A surface for all that is left must explain so many times what one for the largest piece does.
 TOGETHER = 1.8
+#: Places of a cell, each way, that all are to be near a part's points.
+IN_A_CELL = 3
 #: Fewest points of a piece, and its least height along an axis, over its size.
 FEWEST, FLAT = 50, 1e-3
 
@@ -251,9 +253,13 @@ def _as_part(fit: Fit, body: TriangleMesh, points: Floats, own: Booleans) -> Fit
     from scipy.spatial import KDTree
 
     phantom = phantom_area(body, fit.surface, fit.pose)
-    places, _ = cells(fit.surface, fit.pose, np.ones_like(fit.allowed))
-    near: Any = KDTree(points[own]).query(places)[0]
-    there = (near <= 1.5 * CLOSE * body.size).reshape(fit.allowed.shape)
+    # All over each cell: where the surface is steep one is longer than a part of it is near.
+    rows, columns = fit.allowed.shape
+    fine = np.ones((IN_A_CELL * rows, IN_A_CELL * columns), dtype=np.bool_)
+    places, _ = cells(fit.surface, fit.pose, fine)
+    away: Any = KDTree(points[own]).query(places)[0]
+    near = away.reshape(rows, IN_A_CELL, columns, IN_A_CELL) <= 1.5 * CLOSE * body.size
+    there = near.all(axis=(1, 3))
     return Fit(
         surface=fit.surface,
         pose=fit.pose,
