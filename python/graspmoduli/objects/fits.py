@@ -28,6 +28,7 @@ from .object_grasps import (
     by_task,
     differ,
     for_task,
+    surest_first,
 )
 from .reading import read
 from .touching import TIP, tip
@@ -147,7 +148,8 @@ class Fit(Fitted):
                 asked,
                 lambda own: self._of_mesh(radius, start, wanted._replace(constraints=own, top=1)),
             )
-        return sorted(for_task(found, loads), key=key, reverse=True)[:many]
+        ranked = sorted(for_task(found, loads), key=key, reverse=True)
+        return (surest_first(ranked, key) if errors is None else ranked)[:many]
 
     def _of_mesh(self, radius: float, seed: int, wanted: Search) -> list[ObjectGrasp]:
         """Grasps pressed on the mesh that keep all constraints."""

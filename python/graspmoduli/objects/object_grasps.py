@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +17,9 @@ from .touching import ContactCheck
 #: Half of the friction stands for what a scan does not tell; what is left then counts, and so does
 #: this share of the quality, and half as much again for each contact that was seen.
 LEFT, QUALITY, SEEN = 0.5, 0.1, 0.5
+#: A grasp that this share of errors of aim leave in force closure comes first before others of up
+#: to twice its quality; as in the kernels, which do not know the bounds for round cones.
+SURE, HALF = 0.99, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +88,19 @@ def for_task(grasps: list[ObjectGrasp], loads: Floats | None) -> list[ObjectGras
     if loads is None:
         return grasps
     return [replace(one, task_quality=task_quality(one, task=loads)) for one in grasps]
+
+
+def surest_first(
+    ranked: list[ObjectGrasp], key: Callable[[ObjectGrasp], float]
+) -> list[ObjectGrasp]:
+    """Without those before the first that bad aim does not lose, if there is any that is half as
+    good as the best."""
+    for number, grasp in enumerate(ranked):
+        if key(grasp) < HALF * key(ranked[0]):
+            break
+        if grasp.held is not None and grasp.held >= SURE:
+            return ranked[number:]
+    return ranked
 
 
 def by_evidence(flat: ObjectGrasp, pressed: ObjectGrasp) -> float:

@@ -200,7 +200,7 @@ fn gap(one: &Place, other: &Place) -> f64 {
 }
 
 /// The nearest places of each.
-fn neighbours(map: &[Place]) -> Vec<Vec<usize>> {
+pub(crate) fn neighbours(map: &[Place]) -> Vec<Vec<usize>> {
     map.par_iter()
         .enumerate()
         .map(|(k, place)| {

@@ -2,8 +2,8 @@
 
 use super::OUTSIDE;
 use super::mesh::Mesh;
-use super::press::{ALIKE, Tip, land_along};
-use crate::contact::Frame;
+use super::press::{ALIKE, ASIDE, Tip, around, land_along};
+use crate::contact::{Contact, Frame};
 use crate::math;
 use crate::places::{Place, Wanted};
 use crate::quality::Evaluator;
@@ -14,8 +14,13 @@ use std::f64::consts::TAU;
 const LEFT: f64 = 0.1;
 /// A ball must touch this close to the contact, over its radius.
 const BESIDE: f64 = 0.6;
-/// Errors of aim: how many combinations are tried.
-const DRAWS: usize = 343;
+/// Where a finger aims that is to press at a place: there, or beside it.
+const AIMS: usize = 1 + ASIDE;
+/// Errors of aim: how many combinations are tried; and how many tell of any two fingers all.
+const DRAWS: usize = 2 * PAIRS;
+const PAIRS: usize = AIMS * AIMS;
+/// Force closure of less quality is none.
+const LEAST: f64 = 1e-9;
 /// Rings about the axis of a finger, over the tip's radius, and rays on each.
 const ROOM: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 const AROUND: usize = 12;
@@ -121,8 +126,22 @@ fn clearance(mesh: &Mesh, tip: &Tip, place: &Place) -> f64 {
     free
 }
 
-/// Share of force closures among fingers that aim beside their contacts, each in its middle or in
-/// one of six directions, and the quality that nine of ten reach. A finger that misses has none.
+/// What a finger touches that aims at a place or beside it; `None` where it misses.
+pub(super) type Aims = [Option<Contact>; AIMS];
+
+/// What a finger touches that is to press at a place.
+pub(super) fn aims(mesh: &Mesh, tip: &Tip, place: &Place, wanted: &Wanted<'_>) -> Aims {
+    let beside = around(place.point, place.normal, wanted.errors);
+    std::array::from_fn(|k| {
+        let aim = if k == 0 { place.point } else { beside[k - 1] };
+        let pressed = tip.press(mesh, aim, place.normal)?;
+        let landing = pressed.landing?;
+        Some(wanted.contact(landing.point, pressed.felt))
+    })
+}
+
+/// Share of force closures among fingers that aim beside their contacts, and the quality that nine
+/// of ten reach. A finger that misses has none.
 fn under_errors(
     mesh: &Mesh,
     tip: &Tip,
@@ -130,28 +149,14 @@ fn under_errors(
     wanted: &Wanted<'_>,
     evaluator: &mut Evaluator,
 ) -> (f64, f64) {
-    let aims: Vec<[Option<_>; 7]> = places
+    let aims: Vec<_> = places
         .iter()
-        .map(|place| {
-            let [x, y] = Frame::new(place.normal).tangents;
-            std::array::from_fn(|k| {
-                let reach = if k == 0 { 0.0 } else { wanted.errors };
-                let (sin, cos) = math::sin_cos(TAU * k as f64 / 6.0);
-                let aim = place.point + (x * cos + y * sin) * reach;
-                let pressed = tip.press(mesh, aim, place.normal)?;
-                let landing = pressed.landing?;
-                Some(wanted.contact(landing.point, pressed.felt))
-            })
-        })
+        .map(|place| aims(mesh, tip, place, wanted))
         .collect();
     let mut values: Vec<f64> = (0..DRAWS)
         .map(|draw| {
-            let chosen: Option<Vec<_>> = aims
-                .iter()
-                .enumerate()
-                .map(|(finger, own)| own[choice(draw, finger)])
-                .collect();
-            chosen.map_or(0.0, |contacts| evaluator.quality(&contacts, DVec3::ZERO))
+            drawn(aims.iter(), draw)
+                .map_or(0.0, |contacts| evaluator.quality(&contacts, DVec3::ZERO))
         })
         .collect();
     values.sort_by(f64::total_cmp);
@@ -159,11 +164,32 @@ fn under_errors(
     (1.0 - lost as f64 / DRAWS as f64, values[DRAWS / 10])
 }
 
-/// Which of seven aims a finger takes: all combinations for three fingers, for more an even choice.
+/// In how many errors of aim force closure is lost, as soon as it is more than `most`.
+pub(super) fn lost(aims: &[&Aims], most: usize, evaluator: &mut Evaluator) -> usize {
+    let mut lost = 0;
+    for draw in 0..PAIRS {
+        let holds = drawn(aims.iter().copied(), draw)
+            .is_some_and(|contacts| evaluator.is_at_least(&contacts, DVec3::ZERO, LEAST));
+        lost += usize::from(!holds);
+        if lost > most {
+            break;
+        }
+    }
+    lost
+}
+
+fn drawn<'a>(aims: impl Iterator<Item = &'a Aims>, draw: usize) -> Option<Vec<Contact>> {
+    aims.enumerate()
+        .map(|(finger, own)| own[choice(draw, finger)])
+        .collect()
+}
+
+/// Which of its aims a finger takes: any two fingers, of up to thirteen, all pairs equally often
+/// (orthogonal arrays of strength 2, R. Bose, K. Bush, 1952).
 fn choice(draw: usize, finger: usize) -> usize {
-    if finger < 3 {
-        draw / 7_usize.pow(finger as u32) % 7
-    } else {
-        (draw * (2 * finger + 5) + draw / 7 + draw / 49) % 7
+    let (one, other, more) = (draw % AIMS, draw / AIMS % AIMS, draw / PAIRS);
+    match finger {
+        0 => one,
+        _ => (other + (finger - 1) * (one + 5 * more)) % AIMS,
     }
 }

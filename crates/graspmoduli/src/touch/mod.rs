@@ -12,6 +12,7 @@
 //! | [`search`] | the best grasps of a map, by [`crate::places`], polished and true |
 //! | [`polish`] | ascent on the mesh itself, every step pressed anew |
 //! | [`gate`] | what of a grasp is true: exact normals, a ball, errors of aim |
+//! | `steady` | grasps that errors of aim do not lose, where they lose the best |
 //!
 //! The mesh is of size 1 about the origin: its caller sees to that.
 
@@ -21,6 +22,7 @@ pub mod mesh;
 pub mod polish;
 pub mod press;
 pub mod search;
+mod steady;
 
 /// Farther than the mesh from the origin, whose size is 1: from there tips start.
 pub(crate) const OUTSIDE: f64 = 2.0;

@@ -13,6 +13,10 @@ const RINGS: [(f64, usize); 4] = [(0.0, 1), (0.3, 6), (0.6, 12), (0.9, 18)];
 const DEPTH: f64 = 0.25;
 /// What is farther behind the first touch than this, over the radius, no longer is the pad's.
 const PAD: f64 = 0.6;
+/// Directions in which fingers are tried that aim beside a place; and 1 / cos(180° / that): as far
+/// out, over their reach, a straight edge within it stops one of them.
+pub(crate) const ASIDE: usize = 12;
+const CORNER: f64 = 1.035_276_180_410_083;
 /// cos 30°: normals that differ more are not of one flat place.
 pub(crate) const ALIKE: f64 = 0.866_025_403_784_438_6;
 
@@ -116,14 +120,20 @@ impl Tip {
         })
     }
 
-    /// Where rays land that aim beside a point, in six directions, half a radius away.
-    pub fn fan(&self, mesh: &Mesh, aim: DVec3, way: DVec3) -> [Option<Landing>; 6] {
-        let [x, y] = Frame::new(way).tangents;
-        std::array::from_fn(|k| {
-            let (sin, cos) = math::sin_cos(TAU * k as f64 / 6.0);
-            land_along(mesh, aim + (x * cos + y * sin) * (0.5 * self.radius), way)
-        })
+    /// Where rays land that aim beside a point, all around, half a radius away.
+    pub fn fan(&self, mesh: &Mesh, aim: DVec3, way: DVec3) -> [Option<Landing>; ASIDE] {
+        let reach = 0.5 * CORNER * self.radius;
+        around(aim, way, reach).map(|beside| land_along(mesh, beside, way))
     }
+}
+
+/// Points beside one, all around across a way.
+pub(crate) fn around(point: DVec3, way: DVec3, reach: f64) -> [DVec3; ASIDE] {
+    let [x, y] = Frame::new(way).tangents;
+    std::array::from_fn(|k| {
+        let (sin, cos) = math::sin_cos(TAU * k as f64 / ASIDE as f64);
+        point + (x * cos + y * sin) * reach
+    })
 }
 
 fn land(mesh: &Mesh, start: DVec3, way: DVec3, distance: f64, face: usize) -> Landing {

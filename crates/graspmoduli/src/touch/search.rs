@@ -4,6 +4,7 @@ use super::gate::{self, Checked};
 use super::mesh::Mesh;
 use super::polish::polish;
 use super::press::Tip;
+use super::steady::steadied;
 use crate::error::Error;
 use crate::parallel::*;
 use crate::places::search::{MANY, candidates};
@@ -22,6 +23,9 @@ const FEW: usize = 30;
 const MUCH: f64 = 2.0;
 /// A grasp that holds in this share of errors of aim is not lost by them.
 const SURE: f64 = 0.99;
+/// It comes before others of up to so many times its quality: this share of theirs.
+const HALF: f64 = 0.5;
+
 /// A grasp of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -62,10 +66,56 @@ pub fn grasps(
     // Bad aim loses what steady places offer: then others must offer much more.
     let others = true_grasps(mesh, tip, map, wanted, threads, stop)?;
     let best = |grasps: &[Found]| grasps.first().map_or(0.0, |grasp| grasp.value);
-    if best(&found) > 0.0 && best(&others) < MUCH * best(&found) {
-        return Ok(found);
+    let half = HALF * best(&found).max(best(&others));
+    // Where aims beside a place land all the same, whatever the normal is there.
+    let landing: Vec<_> = map
+        .iter()
+        .copied()
+        .filter(|place| {
+            tip.fan(mesh, place.point, place.normal)
+                .iter()
+                .all(Option::is_some)
+        })
+        .collect();
+    let starts = if landing.len() >= wanted.fingers {
+        candidates(&landing, wanted, &MANY, threads, stop)?
+    } else {
+        Vec::new()
+    };
+    let sought = steadied(mesh, tip, &landing, &starts, half, wanted);
+    if stop.load(Ordering::Relaxed) {
+        return Err(Error::Interrupted);
     }
-    Ok(others)
+    let mut sure: Vec<_> = sought
+        .iter()
+        .filter_map(|grasp| climbed(mesh, tip, grasp, 1.0, 0, wanted))
+        .filter(|grasp| grasp.checked.holds >= SURE && grasp.value >= half)
+        .collect();
+    sure.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let kept = if best(&found) > 0.0 && best(&others) < MUCH * best(&found) {
+        found
+    } else {
+        others
+    };
+    let mut all: Vec<Found> = Vec::new();
+    for grasp in sure.into_iter().chain(kept) {
+        let mut others = all.iter();
+        if others.all(|other| wanted.differ(&grasp.places, &other.places)) {
+            all.push(grasp);
+        }
+    }
+    all.sort_by(|a, b| b.value.total_cmp(&a.value));
+    Ok(surest_first(all))
+}
+
+/// Without those before the first that bad aim does not lose, if there is any that is half as good.
+fn surest_first(mut grasps: Vec<Found>) -> Vec<Found> {
+    let half = grasps.first().map_or(0.0, |grasp| HALF * grasp.value);
+    let sure = |grasp: &Found| grasp.checked.holds >= SURE && grasp.value >= half;
+    if let Some(first) = grasps.iter().position(sure) {
+        grasps.drain(..first);
+    }
+    grasps
 }
 
 /// The best grasps among places, on pads that are as flat as they may be.
@@ -150,13 +200,7 @@ fn checked(
         }
     }
     kept.sort_by(|a, b| b.value.total_cmp(&a.value));
-    // The first is one that bad aim does not lose, if there is any that is half as good.
-    let half = kept.first().map_or(0.0, |grasp| 0.5 * grasp.value);
-    let sure = |grasp: &Found| grasp.checked.holds >= SURE && grasp.value >= half;
-    if let Some(first) = kept.iter().position(sure) {
-        kept.drain(..first);
-    }
-    Ok(kept)
+    Ok(surest_first(kept))
 }
 
 /// A grasp after some rounds of polishing, or as it is if only that is true; `None` if neither is.
