@@ -19,8 +19,9 @@ from conftest import ROOT, objects, quick
 from graspmoduli.objects.touching import TriangleMesh
 
 CUP = ROOT / "examples" / "objects" / "plastic_cup.ply"
-#: Too thin for a tip of 5 % of their size: their grasps are true, but bad aim may lose them.
-THIN = ("spoon", "fork", "scissors", "wrench", "chair_leg", "cage")
+#: Too thin for a tip of 5 % of their size: where every aim lands there are only grasps of less than
+#: half of the quality, so that theirs are true, but bad aim may lose them.
+THIN = ("fork", "scissors", "wrench")
 
 
 def quiet_fit(source):
