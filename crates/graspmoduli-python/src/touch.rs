@@ -74,8 +74,8 @@ impl Mesh {
         let vertices = vectors(vertices.as_slice()?);
         let faces: &[[i64; 3]] = faces.as_slice()?.as_chunks().0;
         Ok(Self(py.detach(|| {
-            let faces: Vec<_> = faces.iter().map(|face| face.map(|v| v as usize)).collect();
-            mesh::Mesh::new(vertices, &faces)
+            let faces = faces.iter().map(|face| face.map(|v| v as usize));
+            mesh::Mesh::new(vertices, faces)
         })))
     }
 

@@ -206,6 +206,40 @@ fn no_ray_falls_through_between_triangles() {
     }
 }
 
+/// Of more than a million triangles several share a leaf; of either half none do.
+#[test]
+fn what_millions_of_triangles_say_is_what_their_halves_say() {
+    let (vertices, faces) = ellipsoid(760, 760, [0.5, 0.4, 0.3]);
+    let mesh = Mesh::new(&vertices, &faces);
+    assert!(mesh.len() > 1 << 20);
+    let (one, other) = faces.split_at(faces.len() / 2);
+    let halves = [one, other].map(|half| Mesh::new(&vertices, half));
+    let least = |values: [Option<f64>; 2]| values.into_iter().flatten().reduce(f64::min);
+    let mut random = Random::new(11);
+    for _ in 0..300 {
+        let way = random.direction();
+        let start = DVec3::from(random.numbers(1)[0]) - 0.5 - way * 2.0;
+        let hits = halves
+            .each_ref()
+            .map(|half| half.ray(start, way).map(|hit| hit.distance));
+        let hit = mesh.ray(start, way);
+        assert_eq!(hit.map(|hit| hit.distance), least(hits));
+        let near = |mesh: &Mesh| mesh.nearest(start).map(|(near, _)| (near - start).length());
+        assert_eq!(near(&mesh), least(halves.each_ref().map(near)));
+        if let Some(hit) = hit {
+            let [x, y, z] = (start + way * hit.distance).to_array();
+            let normal = DVec3::new(x / 0.25, y / 0.16, z / 0.09).normalize();
+            assert!(mesh.normal(hit.face).dot(normal).abs() > 0.9999);
+        }
+    }
+    for _ in 0..20 {
+        let way = random.direction();
+        let start = DVec3::from(random.numbers(1)[0]) - 0.5 - way * 2.0;
+        let stop = |mesh: &Mesh| mesh.sweep(start, way, 0.01).map(|touch| touch.distance);
+        assert_eq!(stop(&mesh), least(halves.each_ref().map(stop)));
+    }
+}
+
 #[test]
 fn a_ball_stops_where_it_touches_and_not_before() {
     let (vertices, faces) = heap(25, 4);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,8 @@ MOST_AREA = 4.0
 THICK_PLANE, THICK_LINE = 0.65, 0.35
 #: Points that stand for an object where only its rough shape matters.
 SAMPLES = 4000
+#: Triangles that are looked at at a time.
+AT_A_TIME = 1 << 20
 #: Points of a scan that are looked at, and of its object that are used; more add nothing but time.
 MOST_OF_SCAN, MOST_POINTS = 100_000, 30_000
 
@@ -187,7 +190,7 @@ def _of_mesh(points: Any, faces: Any, number: int | None, notes: list[str]) -> O
             f"object must have triangles as whole numbers of shape (k, 3), "
             f"got {triangles.dtype} {triangles.shape}"
         )
-    triangles = triangles.astype(np.int64)
+    triangles = triangles.astype(np.int64, copy=False)
     if len(triangles) and not (triangles.min() >= 0 and triangles.max() < len(array)):
         raise GraspModuliError(
             f"object must have triangles among its {len(array)} vertices, "
@@ -214,8 +217,11 @@ def size_of(points: Floats, samples: Floats) -> float:
 
 def _used(points: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
     """Without vertices that no triangle uses."""
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return points[used], renumbered.reshape(faces.shape)
+    used = np.zeros(len(points), dtype=np.bool_)
+    used[faces.ravel()] = True
+    if used.all():
+        return points, faces
+    return points[used], (np.cumsum(used) - 1)[faces]
 
 
 def _check_extent(points: Floats) -> None:
@@ -247,9 +253,7 @@ def mesh_samples(
     points: Floats, faces: NDArray[np.int64], count: int = SAMPLES
 ) -> tuple[Floats, Floats]:
     """Points spread over a mesh by area, the same ones every time."""
-    corners = points[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(cross, axis=1)
+    doubled = doubled_areas(points, faces)
     if not doubled.sum() > 0.0:
         raise GraspModuliError("object must have triangles with an area, got none")
     a, b, c = np.ptp(points, axis=0)
@@ -267,10 +271,27 @@ def mesh_samples(
     a, b = random.random((2, count, 1))
     fold = a + b > 1.0
     a, b = np.where(fold, 1.0 - a, a), np.where(fold, 1.0 - b, b)
-    triangle = corners[chosen]
-    samples = triangle[:, 0] + a * (triangle[:, 1] - triangle[:, 0])
-    samples = samples + b * (triangle[:, 2] - triangle[:, 0])
-    return samples, cross[chosen] / np.maximum(doubled[chosen], 1e-300)[:, None]
+    triangle = points[faces[chosen]]
+    one, other = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    samples = triangle[:, 0] + a * one
+    samples = samples + b * other
+    return samples, np.cross(one, other) / np.maximum(doubled[chosen], 1e-300)[:, None]
+
+
+def some_faces(faces: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """All triangles, so many at a time that millions of them do not need gigabytes."""
+    for start in range(0, len(faces), AT_A_TIME):
+        yield faces[start : start + AT_A_TIME]
+
+
+def doubled_areas(points: Floats, faces: NDArray[np.int64]) -> Floats:
+    """Twice the area of each triangle. Shape (k,)."""
+    areas = []
+    for some in some_faces(faces):
+        corners = points[some]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas.append(np.sqrt((across * across).sum(axis=1)))
+    return np.concatenate(areas) if areas else np.zeros(0)
 
 
 def _cloud_samples(points: Floats) -> tuple[Floats, Floats]:

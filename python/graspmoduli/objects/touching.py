@@ -16,7 +16,7 @@ from .. import _core
 from .._arrays import Floats, count, floats, locked, number
 from .._core import GraspModuliError
 from .._values import Value
-from .reading import Object, read
+from .reading import Object, doubled_areas, read, some_faces
 
 #: The radius of a fingertip over the size of the object, if none is given.
 TIP = 0.05
@@ -110,26 +110,31 @@ class TriangleMesh:
     @cached_property
     def shape(self) -> Shape:
         """Centre of mass: of the solid, its density uniform, if the mesh is closed."""
-        corners = self.local(self.vertices)[self.faces]
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        across = np.cross(b - a, c - a)
-        volumes = (a * np.cross(b, c)).sum(axis=1)
-        volume = float(volumes.sum())
-        if _is_closed(self.vertices, self.faces) and abs(volume) > 1e-6:
-            center = ((a + b + c) * volumes[:, None]).sum(axis=0) / (4.0 * volume)
+        points = self.local(self.vertices)
+        volume = area = 0.0
+        of_solid, of_area = np.zeros(3), np.zeros(3)
+        for some in some_faces(self.faces):
+            corners = points[some]
+            a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+            across, middles = np.cross(b - a, c - a), a + b + c
+            areas = np.sqrt((across * across).sum(axis=1))
+            volumes = (a * np.cross(b, c)).sum(axis=1)
+            volume += float(volumes.sum())
+            area += float(areas.sum())
+            of_solid += (middles * volumes[:, None]).sum(axis=0)
+            of_area += (middles * areas[:, None]).sum(axis=0)
+        if abs(volume) > 1e-6 and _is_closed(self.vertices, self.faces):
+            center = of_solid / (4.0 * volume)
             # Of parts that are wound against each other the sum is no centre.
-            if (np.abs(center) <= 0.5 * np.ptp(corners, axis=(0, 1))).all():
+            if (np.abs(center) <= 0.5 * np.ptp(points, axis=0)).all():
                 return Shape(locked(self.back(center)), True)
-        area = np.sqrt((across * across).sum(axis=1))
-        center = ((a + b + c) * area[:, None]).sum(axis=0) / (3.0 * area.sum())
-        return Shape(locked(self.back(center)), False)
+        return Shape(locked(self.back(of_area / (3.0 * area))), False)
 
     @cached_property
     def area(self) -> float:
         """Of all triangles, in the object's unit, squared."""
-        corners = self.local(self.vertices)[self.faces]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return float(0.5 * np.sqrt((across * across).sum(axis=1)).sum() * self.size**2)
+        doubled = doubled_areas(self.local(self.vertices), self.faces)
+        return float(0.5 * doubled.sum() * self.size**2)
 
     @cached_property
     def radius(self) -> float:
@@ -154,15 +159,15 @@ def _is_closed(vertices: Floats, faces: NDArray[np.int64]) -> bool:
 
 def _is_paired(faces: NDArray[np.int64], count: int) -> bool:
     """Is every directed edge there as often as its reverse?"""
-    one, other = faces.ravel(), faces[:, [1, 2, 0]].ravel()
-    edges = one != other
-    one, other = one[edges], other[edges]
-    if (np.bincount(one, minlength=count) != np.bincount(other, minlength=count)).any():
+    rising, falling = [], []
+    for k in range(3):
+        one, other = faces[:, k], faces[:, (k + 1) % 3]
+        up, down = one < other, one > other
+        rising.append(one[up] * count + other[up])
+        falling.append(other[down] * count + one[down])
+    if sum(map(len, rising)) != sum(map(len, falling)):
         return False
-    up = one < other
-    rising = np.sort(one[up] * count + other[up])
-    falling = np.sort(other[~up] * count + one[~up])
-    return bool(np.array_equal(rising, falling))
+    return bool(np.array_equal(*(np.sort(np.concatenate(one)) for one in (rising, falling))))
 
 
 @dataclass(frozen=True, eq=False)

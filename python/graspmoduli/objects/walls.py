@@ -19,7 +19,7 @@ from .._arrays import Floats, locked
 from .._core import GraspModuliError, arctan2, cos, normal_equations, sin, solve_banded
 from ..splines import clamped_knots
 from ..surfaces import Surface
-from .reading import Object
+from .reading import Object, some_faces
 
 #: A point this close to the fitted surface, relative to the object's size, is explained by it.
 CLOSE = 0.02
@@ -121,14 +121,23 @@ def _hits(thing: Object, axis: Axis, rows: int, columns: int, *, exact: bool) ->
 def _mesh_hits(local: Floats, faces: NDArray[np.int64], grid: Grid) -> Hits:
     """All crossings of the mesh with rays through the middles of the cells."""
     step = (grid.high - grid.low) / grid.rows
-    corners = local[faces]
-    z = corners[:, :, 2]
-    # Reductions over an axis of three are slow.
-    lowest = np.minimum(np.minimum(z[:, 0], z[:, 1]), z[:, 2])
-    highest = np.maximum(np.maximum(z[:, 0], z[:, 1]), z[:, 2])
-    first = np.ceil((lowest - grid.low) / step - 0.5).astype(np.int64)
-    last = np.floor((highest - grid.low) / step - 0.5).astype(np.int64)
-    first, last = np.maximum(first, 0), np.minimum(last, grid.rows - 1)
+    height = np.ascontiguousarray(local[:, 2])
+    crossing, first, last = [], [], []
+    for some in some_faces(faces):
+        z = height[some]
+        # Reductions over an axis of three are slow.
+        lowest = np.minimum(np.minimum(z[:, 0], z[:, 1]), z[:, 2])
+        highest = np.maximum(np.maximum(z[:, 0], z[:, 1]), z[:, 2])
+        begin = np.maximum(np.ceil((lowest - grid.low) / step - 0.5).astype(np.int64), 0)
+        end = np.floor((highest - grid.low) / step - 0.5).astype(np.int64)
+        end = np.minimum(end, grid.rows - 1)
+        # Of many small triangles few lie across the plane of a row.
+        across = begin <= end
+        crossing.append(some[across])
+        first.append(begin[across])
+        last.append(end[across])
+    corners = local[np.concatenate(crossing)]
+    first, last = np.concatenate(first), np.concatenate(last)
     triangle, offset = _ranges(last - first + 1)
     row = first[triangle] + offset
     height = grid.low + (row.astype(np.float64) + 0.5) * step
