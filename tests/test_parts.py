@@ -1,6 +1,7 @@
 """Objects in parts that are surfaces with cylindrical coordinates, and grasps carried between."""
 
 import copy
+import dataclasses
 import pickle
 import warnings
 from functools import cache
@@ -10,6 +11,7 @@ import pytest
 from scipy.spatial import KDTree
 
 import graspmoduli as gm
+import graspmoduli.objects.parts
 import objects_made
 import true_grasps
 from conftest import ROOT, some_long
@@ -155,6 +157,16 @@ def test_what_has_no_parts_is_refused_in_one_sentence():
             gm.fit_parts(wrong)
     with pytest.raises(gm.GraspModuliError, match="points must have shape"):
         parts_of("mug").part_of([[1.0, 2.0]])
+
+
+def test_a_wall_that_explains_nothing_is_refused(monkeypatch):
+    first = parts_of("mug").parts[0]
+    pose = first.pose.copy()
+    pose[:3, 3] += 10.0
+    away = dataclasses.replace(first, pose=pose)
+    monkeypatch.setattr(graspmoduli.objects.parts, "fit_object", lambda thing: away)
+    with pytest.raises(gm.GraspModuliError, match="got one that explains nothing"):
+        gm.fit_parts(objects_made.mug())
 
 
 def test_pictures_show_parts_and_shares():
