@@ -167,7 +167,8 @@ def _is_paired(faces: NDArray[np.int64], count: int) -> bool:
         falling.append(other[down] * count + one[down])
     if sum(map(len, rising)) != sum(map(len, falling)):
         return False
-    return bool(np.array_equal(*(np.sort(np.concatenate(one)) for one in (rising, falling))))
+    one, other = (np.sort(np.concatenate(edges)) for edges in (rising, falling))
+    return bool(np.array_equal(one, other))
 
 
 @dataclass(frozen=True, eq=False)
