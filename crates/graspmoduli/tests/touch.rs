@@ -502,7 +502,7 @@ fn one_triangle_plates_and_needles_do_not_fail() {
     let random = Random::new(15).numbers(300);
     let single = Mesh::new(
         &[[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
-        &[[0, 1, 2], [0, 0, 1]],
+        [[0, 1, 2], [0, 0, 1]],
     );
     assert_eq!(single.len(), 1);
     found(&single, &random, 1);
