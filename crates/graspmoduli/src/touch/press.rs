@@ -13,8 +13,7 @@ const RINGS: [(f64, usize); 4] = [(0.0, 1), (0.3, 6), (0.6, 12), (0.9, 18)];
 const DEPTH: f64 = 0.25;
 /// What is farther behind the first touch than this, over the radius, no longer is the pad's.
 const PAD: f64 = 0.6;
-/// Directions in which fingers are tried that aim beside a place; and 1 / cos(180° / that): as far
-/// out, over their reach, a straight edge within it stops one of them.
+/// Directions of aims beside a place; and how far out, 1 / cos(180° / 12), none passes by an edge.
 pub(crate) const ASIDE: usize = 12;
 const CORNER: f64 = 1.035_276_180_410_083;
 /// cos 30°: normals that differ more are not of one flat place.
