@@ -15,6 +15,8 @@ def read_toml(name: str, path: Path) -> dict[str, Any]:
         import tomllib
     else:
         import tomli as tomllib
+    if not path.is_file():
+        raise GraspModuliError(f"{name} must be a TOML file, got no file {path}")
     try:
         with path.open("rb") as file:
             return tomllib.load(file)

@@ -19,7 +19,9 @@ from ._arrays import (
     a_callback,
     a_path,
     brief,
+    finite,
     number,
+    unit,
     vectors,
 )
 from ._core import GraspModuliError
@@ -54,8 +56,9 @@ GRID = (64, 128)
 class Constraints(Value):
     """Where fingers may go and what they must hold, in the object's coordinates and unit.
 
-    All are kept while grasps are searched for and improved, and by every grasp that comes back.
-    Those that are not given ask for nothing.
+    Every grasp that comes back keeps all. Distances, directions, zones and regions are kept while
+    grasps are searched for and improved; ``payload`` and ``accept`` are asked of the grasps that
+    were found, four times as many as are wanted. Those that are not given ask for nothing.
 
     A *zone* is a box, ``{"low": (x, y, z), "high": (x, y, z)}`` or just such a pair of corners,
     open where a number is infinite; or a half-space, ``{"point": (x, y, z), "normal": (x, y, z)}``:
@@ -155,8 +158,9 @@ class Constraints(Value):
 
         The payload is not asked for: it takes a whole grasp.
         """
-        points = np.ascontiguousarray(vectors("contacts", contacts, "(m, 3)"))
-        ways = np.ascontiguousarray(vectors("normals", normals, "(m, 3)"))
+        points = np.ascontiguousarray(finite("contacts", vectors("contacts", contacts, "(m, 3)")))
+        ways = unit("normals", finite("normals", vectors("normals", normals, "(m, 3)")))
+        ways = np.ascontiguousarray(ways)
         if points.ndim != 2 or points.shape != ways.shape:
             raise GraspModuliError(
                 f"contacts and normals must have shape (m, 3), got {points.shape} and {ways.shape}"
@@ -166,7 +170,7 @@ class Constraints(Value):
         return (
             bool(self.places(points, ways, limits).all())
             and bool((pairs | np.eye(len(points), dtype=np.bool_)).all())
-            and (self.accept is None or bool(self.accept(points, ways)))
+            and (self.accept is None or _yes_or_no(self.accept(points, ways)))
         )
 
     def places(self, contacts: Floats, normals: Floats, limits: Any) -> Booleans:
@@ -275,6 +279,12 @@ class Constraints(Value):
         )
 
 
+def _yes_or_no(answer: Any) -> bool:
+    if not isinstance(answer, bool | np.bool_):
+        raise GraspModuliError(f"accept must answer True or False, got {brief(answer)}")
+    return bool(answer)
+
+
 def a_constraint(name: str, value: Any) -> Constraints:
     """``value`` if it is constraints; none if not given."""
     if value is None:
@@ -297,7 +307,8 @@ def raise_for_none(asked: Constraints, found: Callable[[Constraints], Sequence[A
     for name in names:
         if is_found(asked.without(name)):
             raise NoGraspLeftError(
-                f"{name} must leave a grasp of the object, got none; without it there are some"
+                f"{name} must leave a grasp of the object, got none of those found; without it "
+                "there are some"
             )
     if len(names) > 1 and is_found(Constraints()):
         raise NoGraspLeftError(

@@ -151,7 +151,7 @@ def read_task(path: str | os.PathLike[str]) -> Floats:
             rows = np.load(file)
         else:
             text = file.read_text().replace(",", " ").splitlines()
-            rows = np.loadtxt(text, ndmin=2)
+            rows = np.loadtxt(text, ndmin=2) if any(map(str.strip, text)) else np.zeros((0, 6))
     # NumPy raises what it likes on files of other kinds.
     except Exception as error:
         raise GraspModuliError(

@@ -51,7 +51,7 @@ def grasp(
     ] = None,
     seed: Annotated[str, typer.Option(help="Seed of the places that are tried.")] = "0",
     fingers: Annotated[
-        str, typer.Option(metavar="M", help="Fingers of a grasp; for a cloud of points 3.")
+        str, typer.Option(metavar="M", help="Fingers of a grasp; two need --torsion.")
     ] = "3",
     torsion: Annotated[
         str, typer.Option(metavar="G", help="Torsional friction of soft fingers, a length.")
@@ -136,7 +136,7 @@ def grasp(
     if not grasps:
         _signals.say(_why_none(fit, read))
         raise typer.Exit(1)
-    if fit.mesh is not None and grasps[0].quality < WORTHLESS:
+    if fit.mesh is not None and task is None and grasps[0].quality < WORTHLESS:
         _signals.say(
             f"the best grasp has a quality of {grasps[0].quality:.2g} only: the object is too thin "
             "for these tips, or too long for its friction; smaller tips may find a better one"

@@ -355,8 +355,9 @@ class Fit(Fitted):
         these; where no grasp that starts there stays on the part, the part's own grasp that is
         nearest is taken.
 
-        The grasp keeps ``constraints``, in the target's coordinates; on a mesh, where none that
-        starts there does, the target's own grasp that is nearest and does is taken.
+        Fingers are hard ones. The grasp keeps ``constraints``, in the target's coordinates; on a
+        mesh, where none that starts there does, the target's own grasp that is nearest and does is
+        taken.
         """
         asked = a_constraint("constraints", constraints)
         if not isinstance(target, Fit):
