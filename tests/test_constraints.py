@@ -124,9 +124,9 @@ def test_no_grasp_breaks_a_rule(fits):
 
 @pytest.mark.long
 def test_no_grasp_breaks_a_rule_of_many(fits):
-    grasps, refused = attack(fits, 500, seed=2)
-    assert grasps > 1000
-    assert refused < 250
+    grasps, refused = attack(fits, 80, seed=2)
+    assert grasps > 160
+    assert refused < 40
 
 
 def test_rules_cost_quality_only_where_they_bind(fits):

@@ -25,10 +25,10 @@ def attacked(regions, grasp, center, seed, many=10_000):
     return gm.quality(contacts, normals, center, friction=np.asarray(grasp.friction), **options)
 
 
-def attack_model(name, share, seed, **options):
+def attack_model(name, share, seed, samples=20_000, **options):
     surface = MODELS[name]
     best = gm.synthesize(surface, top=1, **options)[0]
-    regions = gm.contact_regions(surface, best, share * best.quality, samples=20_000)
+    regions = gm.contact_regions(surface, best, share * best.quality, samples=samples)
     for region, contact, normal in zip(regions, best.contacts, best.normals, strict=True):
         assert region.contains(contact, normal)
     if min(len(region.contacts) for region in regions):
@@ -51,13 +51,13 @@ def test_no_attack_inside_is_lost(name):
 @pytest.mark.parametrize("name", list(MODELS))
 def test_no_attack_inside_is_lost_on_any_model(name):
     done = 0
-    for share in (0.9, 0.7, 0.5, 0.3, 0.1, 0.01):
+    for share in (0.7, 0.2):
         for options in (
             {}, {"contacts": 4}, {"contacts": 2, "torsion": 0.15}, {"torsion": 0.1},
-            {"friction": [0.3, 0.6, 0.9]}, {"edges": 4}, {"edges": 13},
+            {"friction": [0.3, 0.6, 0.9]}, {"edges": 4},
         ):  # fmt: skip
-            done += attack_model(name, share, seed=2, **options) is not None
-    assert done > 25
+            done += attack_model(name, share, seed=2, samples=4_000, **options) is not None
+    assert done > 6
 
 
 def test_outside_of_its_region_a_finger_can_lose_the_grasp():
