@@ -228,6 +228,20 @@ def test_transfer_keeps_rules():
     assert there.quality > 0.0
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{"contacts": 2, "torsion": 0.01}, {"contacts": 4}, {"norm": "each", "friction": 0.6}],
+)
+def test_any_fingers_are_carried_as_they_are(options):
+    bottle, mug = fit_of("bottle"), fit_of("mug")
+    best = bottle.synthesize(top=1, **options)[0]
+    there = bottle.transfer_to(mug, best)
+    assert len(there.contacts) == len(best.contacts)
+    for name in ("friction", "edges", "torsion", "norm"):
+        assert getattr(there, name) == getattr(best, name)
+    assert gm.quality(there) == there.quality > 0.0
+
+
 def test_files_say_the_same_as_arguments(tmp_path):
     path = tmp_path / "jaw.toml"
     path.write_text(

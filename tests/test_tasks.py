@@ -255,6 +255,17 @@ class TestGraspsForATask:
             gm.task_quality(grasp, task=self.LID) for grasp in free
         )
 
+    @pytest.mark.parametrize("seed", [0, 2])
+    def test_a_task_never_leaves_less_than_no_task(self, seed):
+        vase = gm.shapes.MODELS["l"]
+        for friction in (0.1, 0.3):
+            options = {"friction": friction, "seed": seed}
+            best, free = (
+                max(gm.task_quality(g, task=self.LID) for g in gm.synthesize(vase, **own))
+                for own in ({**options, "task": self.LID}, options)
+            )
+            assert best >= free > 0.0
+
     def test_on_a_mesh(self):
         fit = gm.fit(objects_made.OBJECTS["bottle"]())
         axis = fit.pose[:3, 2]

@@ -13,7 +13,7 @@ from ._arrays import Floats, a_callback, cells, coordinates, cores, count, float
 from ._batches import Cone, evaluated_with, fingers, frictions_of
 from ._core import GraspModuliError
 from .constraints import Constraints, a_constraint, raise_for_none
-from .grasps import Grasp, RankedGrasp, a_surface, place
+from .grasps import Grasp, PlacedGrasp, RankedGrasp, a_surface, place
 from .quality import largest_quality, quality
 from .sampling import unit_square
 from .surfaces import Surface
@@ -23,6 +23,8 @@ from .tasks import one_task, scaled_task, task_quality
 EXTRA_SAMPLES = 40
 #: Contacts all over the surface among which other fingers are placed.
 SAMPLES = 1_000
+#: Of any two grasps at least one contact differs by this share of the object's radius.
+APART = 0.15
 #: Most contacts of a grasp that is searched for, most grasps that are returned, most threads.
 MOST_CONTACTS, MOST_RANKED, MOST_THREADS = 100, 1_000_000, 1_024
 #: Most grasps that synthesis returns, or follows.
@@ -220,7 +222,16 @@ def synthesize(
     grid = cells(allowed)
     loads = one_task(task)
     if size != 3 or torsion > 0.0 or hand[3] or asked.given or loads is not None:
-        return _constrained(surface, center, hand, size, top, seed, grid, asked, loads)
+        found = _constrained(surface, center, hand, size, top, seed, grid, asked, loads)
+        if loads is None:
+            return found
+        plain = synthesize(
+            surface, contacts=contacts, torsion=torsion, norm=norm, top=top, friction=friction,
+            edges=edges, seed=seed, center_of_mass=own, allowed=allowed, starts=starts,
+            constraints=constraints,
+        )  # fmt: skip
+        both = with_plain(found, plain, APART * surface.radius_about(np.array(center)))
+        return sorted(both, key=lambda one: task_quality(one, task=loads), reverse=True)[:top]
     square = unit_square(EXTRA_SAMPLES, seed)
     rows = _core.synthesize(surface._core, center, hand, top, followed, square, grid)
     grasps = [Grasp(row[0:6:2], row[1:6:2]) for row in rows]
@@ -276,6 +287,22 @@ def _constrained(
     if not best and asked.given:
         raise_for_none(asked, found)
     return best
+
+
+def differ(one: PlacedGrasp, other: PlacedGrasp, apart: float) -> bool:
+    """Is there no pairing of their contacts in which each pair is at most so far apart?"""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    away = one.contacts[:, None] - other.contacts
+    near = np.sqrt((away * away).sum(axis=2)) <= apart
+    return bool((maximum_bipartite_matching(csr_array(near)) < 0).any())
+
+
+def with_plain(for_task: list[Any], plain: list[Any], apart: float) -> list[Any]:
+    """Grasps that were looked for by a task, and those for all loads that differ from them: what is
+    good for all may be better at it than what was found."""
+    return for_task + [one for one in plain if all(differ(one, other, apart) for other in for_task)]
 
 
 def many_grasps(

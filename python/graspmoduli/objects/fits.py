@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -14,19 +13,27 @@ from .._batches import Cone, fingers
 from .._core import GraspModuliError
 from ..constraints import Constraints, a_constraint, raise_for_none
 from ..grasps import Grasp
-from ..synthesis import MOST_CONTACTS, MOST_FOLLOWED, check_fingers, many_grasps, synthesize
+from ..synthesis import (
+    APART,
+    MOST_CONTACTS,
+    MOST_FOLLOWED,
+    check_fingers,
+    differ,
+    many_grasps,
+    synthesize,
+    with_plain,
+)
 from ..tasks import one_task, scaled_task
 from ..transfers import transfer
 from .fitted import Fitted
 from .likeness import cells, ways
-from .mesh_grasps import APART, Pressed, Search, press, search
+from .mesh_grasps import Pressed, Search, press, search
 from .object_grasps import (
     ObjectGrasp,
     by_errors,
     by_evidence,
     by_round_cones,
     by_task,
-    differ,
     for_task,
     surest_first,
 )
@@ -148,6 +155,9 @@ class Fit(Fitted):
                 asked,
                 lambda own: self._of_mesh(radius, start, wanted._replace(constraints=own, top=1)),
             )
+        if loads is not None:
+            plain = self._of_mesh(radius, start, wanted._replace(task=None)) if found else []
+            found = with_plain(found, plain, APART * self.length_scale)
         ranked = sorted(for_task(found, loads), key=key, reverse=True)
         return (surest_first(ranked, key) if errors is None else ranked)[:many]
 
@@ -338,8 +348,8 @@ class Fit(Fitted):
         grasp: Grasp | ObjectGrasp,
         method: str = "ascent",
         *,
-        friction: ArrayLike = 1.0,
-        edges: int = 8,
+        friction: ArrayLike | None = None,
+        edges: int | None = None,
         constraints: Constraints | None = None,
     ) -> ObjectGrasp:
         """A grasp of this object carried to another one, in that one's own coordinates.
@@ -355,17 +365,34 @@ class Fit(Fitted):
         these; where no grasp that starts there stays on the part, the part's own grasp that is
         nearest is taken.
 
-        Fingers are hard ones. The grasp keeps ``constraints``, in the target's coordinates; on a
-        mesh, where none that starts there does, the target's own grasp that is nearest and does is
-        taken.
+        Fingers are those of the grasp, with ``friction`` and ``edges`` if they are given; those of
+        contact coordinates are hard ones, with 1 and 8. Others than three hard fingers are carried
+        naïvely before they climb, and to meshes only. The grasp keeps ``constraints``, in the target's coordinates. With these
+        or with other fingers, where none that starts there holds, the target's own grasp that is
+        nearest is taken.
         """
         asked = a_constraint("constraints", constraints)
         if not isinstance(target, Fit):
             raise GraspModuliError(f"target must be a Fit, got {brief(target)}")
+        torsion, norm, placed = 0.0, "sum", None
         if isinstance(grasp, ObjectGrasp):
+            torsion, norm = grasp.torsion, grasp.norm
+            friction = grasp.friction if friction is None else friction
+            edges = grasp.edges if edges is None else edges
             placed, grasp = grasp, self.on_surface(grasp)
-        else:
+        friction = 1.0 if friction is None else friction
+        edges = 8 if edges is None else edges
+        if placed is None:
             placed = self.in_object(grasp, friction=friction, edges=edges)
+        hand = fingers(friction, edges, len(grasp), torsion, norm)
+        other_hand = len(grasp) != 3 or torsion > 0.0 or norm != "sum"
+        if other_hand:
+            if target.mesh is None:
+                raise GraspModuliError(
+                    'target must have a mesh for other than three hard fingers with norm "sum", '
+                    "got a cloud of points"
+                )
+            method = "naive"
         if self.part and target.part:
             starts = self._laid_on(target, placed)
         else:
@@ -384,7 +411,6 @@ class Fit(Fitted):
                     f"{' or '.join(asked.given)}"
                 )
         assert target.mesh is not None
-        hand = fingers(friction, edges, len(grasp))
         aim = 0.5 * TIP * target.mesh.size
         center = target._center(asked.center_of_mass)
         wanted = Search(hand, center, target.length_scale, len(grasp), 1, aim, asked)
@@ -397,11 +423,12 @@ class Fit(Fitted):
         found = [one for one in found if target._keeps(asked, one, radius)]
         if target.part:
             found = [one for one in found if target._is_on(one.contacts).all()]
-        if (target.part or asked.given) and not found:
+        if (target.part or asked.given or other_hand) and not found:
             # Where none of these stays on the part, its own grasp that is most like them.
             own = target.synthesize(
-                contacts=len(grasp), top=10, friction=friction, edges=edges, constraints=asked
-            )
+                contacts=len(grasp), torsion=torsion, norm=norm, top=10, friction=friction,
+                edges=edges, constraints=asked,
+            )  # fmt: skip
             found = sorted(own, key=lambda one: _unlike(one.contacts, starts))[:1]
         if not found:
             raise GraspModuliError(
@@ -448,9 +475,12 @@ class Fit(Fitted):
 
 
 def _unlike(contacts: Floats, starts: list[tuple[Floats, Floats]]) -> float:
-    """How far contacts are from the nearest of others, in any order of the fingers."""
-    return min(
-        float(np.sqrt(((contacts[list(order)] - others) ** 2).sum(axis=1)).max())
-        for others, _ in starts
-        for order in permutations(range(len(contacts)))
-    )
+    """How far contacts are from the nearest of others, in the best order of the fingers."""
+    from scipy.optimize import linear_sum_assignment
+
+    def farthest(others: Floats) -> float:
+        away = contacts[:, None] - others
+        squares = (away * away).sum(axis=2)
+        return float(np.sqrt(squares[linear_sum_assignment(squares)].max()))
+
+    return min(farthest(others) for others, _ in starts)

@@ -12,14 +12,13 @@ from .. import _core
 from .._arrays import Floats, NoGraspLeftError, cores
 from .._batches import Cone
 from ..constraints import Constraints
+from ..synthesis import APART
 from ..tasks import scaled_task
 from .touching import BEARING, NORMAL, POINT, SAMPLES, ContactCheck, TriangleMesh, places
 
 #: Samples of a mesh if only a part of it is to be grasped, or few places are allowed; and if even
 #: then there are fewer than FEW.
 OF_A_PART, OF_A_SPOT, FEW = 4_000, 20_000, 200
-#: Of any two grasps at least one contact differs by this share of the object's radius.
-APART = 0.15
 
 
 class Pressed(NamedTuple):

@@ -116,13 +116,3 @@ def by_evidence(flat: ObjectGrasp, pressed: ObjectGrasp) -> float:
     )
     seen = sum(check.seen for check in pressed.checks or ())
     return (left + QUALITY * by_round_cones(pressed)) * (1.0 + SEEN * seen)
-
-
-def differ(one: ObjectGrasp, other: ObjectGrasp, apart: float) -> bool:
-    """Is there no pairing of their contacts in which each pair is at most so far apart?"""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import maximum_bipartite_matching
-
-    away = one.contacts[:, None] - other.contacts
-    near = np.sqrt((away * away).sum(axis=2)) <= apart
-    return bool((maximum_bipartite_matching(csr_array(near)) < 0).any())
