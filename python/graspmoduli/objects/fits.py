@@ -367,9 +367,9 @@ class Fit(Fitted):
 
         Fingers are those of the grasp, with ``friction`` and ``edges`` if they are given; those of
         contact coordinates are hard ones, with 1 and 8. Others than three hard fingers are carried
-        naïvely before they climb, and to meshes only. The grasp keeps ``constraints``, in the target's coordinates. With these
-        or with other fingers, where none that starts there holds, the target's own grasp that is
-        nearest is taken.
+        naïvely before they climb, and to meshes only. The grasp keeps ``constraints``, in the
+        target's coordinates. With these or with other fingers, where none that starts there holds,
+        the target's own grasp that is nearest is taken.
         """
         asked = a_constraint("constraints", constraints)
         if not isinstance(target, Fit):
