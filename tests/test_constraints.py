@@ -140,6 +140,17 @@ def test_rules_cost_quality_only_where_they_bind(fits):
     assert 0.0 < tight.quality < free.quality
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_half_of_a_cube_is_like_the_other_halves(axis, sign):
+    """Places are taken all over what is allowed, not where the file happens to begin."""
+    normal = sign * np.eye(3)[axis]
+    half = gm.Constraints(wanted=[{"point": (0, 0, 0), "normal": -normal}])
+    best = fit_of("cube").synthesize(top=1, constraints=half)[0]
+    assert (best.contacts @ normal > 0.0).all()
+    assert best.quality > 0.3
+
+
 def test_a_jaw_is_as_good_as_the_best_of_all_pairs(fits):
     for name in ("bottle", "hammer", "banana"):
         fit = fits[name]

@@ -92,7 +92,10 @@ def _allowed_places(
         allowed = wanted.constraints.places(points, rows[:, NORMAL], limits)
         if within is not None:
             allowed &= within(points)
-        rows = np.ascontiguousarray(rows[allowed][:SAMPLES])
+        rows = rows[allowed]
+        # Evenly all over the object: samples come in the order of its triangles.
+        some = np.arange(min(len(rows), SAMPLES)) * len(rows) // max(1, min(len(rows), SAMPLES))
+        rows = np.ascontiguousarray(rows[some])
         if 2 * len(rows) >= total or len(rows) >= (SAMPLES if samples == SAMPLES else FEW):
             break
     return rows
